@@ -42,16 +42,24 @@ ABOVE_0 = NUMBER | {"exclusiveMinimum": 0}
 TRUTH = {"type": "boolean"}
 WORD = {"type": "string", "pattern": NAME}
 ITEMS = {"type": "array", "items": WORD, "minItems": 1, "uniqueItems": True}
+DESCRIBED = {"type": "object", "propertyNames": WORD, "additionalProperties": TEXT}
+ENUMERATION = {"anyOf": [ITEMS, DESCRIBED | {"minProperties": 1}]}
 ROWS = {"type": "array", "items": NUMBER, "minItems": 2}
+VALUE = {"type": "object", "properties": {"value": EXPRESSION, FOR: EXPRESSION}}
+NEW = {"anyOf": [EXPRESSION, VALUE | {"required": ["value"], "additionalProperties": False}]}
 KEYS: dict[str, Schema] = {  # start: by the type
     **dict.fromkeys(("min", "max"), NUMBER),
     **dict.fromkeys(("unit", "description", "file", "derivative_of"), TEXT),
     **dict.fromkeys(("x", "y"), {"anyOf": [ROWS, TEXT]}),  # lists, or columns of the file
-    **dict.fromkeys(("reinit", "set"), {"type": "object", "additionalProperties": EXPRESSION}),
+    **dict.fromkeys(("reinit", "set"), {"type": "object", "additionalProperties": NEW}),
+    "where": {"type": "object", "propertyNames": WORD, "additionalProperties": EXPRESSION},
     **dict.fromkeys(("derivative", "value", "when", "while", "every", "offset", FOR), EXPRESSION),
     "nominal": ABOVE_0,
     "start": {},
-    "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ITEMS]},
+    "variability": {"enum": ["fixed", "discrete"]},
+    "shown": TRUTH,
+    "derivative_of": WORD,
+    "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ENUMERATION]},
     "z": {"type": "array", "items": ROWS, "minItems": 2},
     "interpolation": {"enum": INTERPOLATIONS},
     "outside": {"enum": OUTSIDE},
@@ -153,12 +161,16 @@ def _entry(section: str) -> Schema:
     if section in reader.NOT_REAL:
         keys, needed = reader.OWN_KEYS[reader.NOT_REAL[section]]
         unordered = [key for key in keys if key not in ("min", "max")]
-        start = _start(TRUTH, *follows)
-        kinds.append((unordered, needed, {"type": {"const": BOOLEAN}, "start": start}))
+
+        def start(*values: Schema) -> Schema:
+            return {"start": _start(*values)} if "start" in keys else {}
+
+        given = {"type": {"const": BOOLEAN}} | start(TRUTH, *follows)
+        kinds.append((unordered, needed, given))
         if reader.NOT_REAL[section] != SWITCHES:
-            whole = {"min": WHOLE, "max": WHOLE, "start": _start(WHOLE, *follows)}
+            whole = {"min": WHOLE, "max": WHOLE} | start(WHOLE, *follows)
             kinds.append((keys, needed, {"type": {"const": INTEGER}} | whole))
-            kinds.append((unordered, needed, {"type": ITEMS, "start": _start({"type": "string"})}))
+            kinds.append((unordered, needed, {"type": ENUMERATION} | start({"type": "string"})))
     known = [*dict.fromkeys(key for keys, *_ in kinds for key in keys)]
     found = _keys(known) | {"anyOf": []}
     for keys, needed, own in kinds:

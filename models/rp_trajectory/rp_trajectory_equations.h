@@ -2,7 +2,7 @@
 #pragma once
 
 #include "motion.h"
-#include "rp_trajectory.h"
+#include "rp_trajectory_values.h"
 
 struct trajectory_point {
     struct motion q[2];  /* rad, m */
@@ -117,7 +117,8 @@ static inline struct motion slide(const struct rp_trajectory_parameters *p,
     const struct motion a = motion_rest(p->a);
     const struct motion reach =
         motion_square_root(motion_difference(dot(ee, ee), motion_product(a, a)));
-    const struct motion L = motion_scaled(p->branch == RP_TRAJECTORY_BACKWARD ? -1.0 : 1.0, reach);
+    const struct motion L =
+        motion_scaled(p->branch == RP_TRAJECTORY_BRANCH_BACKWARD ? -1.0 : 1.0, reach);
     *seen_from_link1 = motion_atan2(a, L);
     return L;
 }
@@ -149,9 +150,8 @@ static inline void inverse_kinematics(const struct rp_trajectory_parameters *p, 
 
 static inline void point_to_point(const struct rp_trajectory_parameters *p, real time,
                                   struct trajectory_point *point) {
-    for (int i = 0; i < 2; i++) {
-        point->q[i] = blend(p, time, p->q_from[i], p->q_to[i]);
-    }
+    point->q[0] = blend(p, time, p->q1_from, p->q1_to);
+    point->q[1] = blend(p, time, p->q2_from, p->q2_to);
     forward_kinematics(p, point);
 }
 
@@ -159,14 +159,13 @@ static inline void point_to_point(const struct rp_trajectory_parameters *p, real
  * from the start. */
 static inline void line(const struct rp_trajectory_parameters *p, real time,
                         struct trajectory_point *point) {
-    struct motion from[2];
-    for (int i = 0; i < 2; i++) {
-        from[i] = motion_rest(p->ee_from[i]);
-        point->ee[i] = blend(p, time, p->ee_from[i], p->ee_to[i]);
-    }
+    const real start[2] = {p->ee_x_from, p->ee_y_from};
+    const struct motion from[2] = {motion_rest(start[0]), motion_rest(start[1])};
+    point->ee[0] = blend(p, time, p->ee_x_from, p->ee_x_to);
+    point->ee[1] = blend(p, time, p->ee_y_from, p->ee_y_to);
     const struct motion start_polar = motion_atan2(from[1], from[0]);
     const struct motion turned = motion_atan2(cross(from, point->ee), dot(from, point->ee));
-    inverse_kinematics(p, motion_sum(start_polar, turned), p->ee_from, start_polar.position, point);
+    inverse_kinematics(p, motion_sum(start_polar, turned), start, start_polar.position, point);
 }
 
 /* Polar angle of center + radius e, e = (cos phase, sin phase), without jumps. A circle around the
@@ -174,7 +173,7 @@ static inline void line(const struct rp_trajectory_parameters *p, real time,
  * from the center's. */
 static inline struct motion polar_on_circle(const struct rp_trajectory_parameters *p,
                                             struct motion phase, const struct motion e[2]) {
-    const struct motion center[2] = {motion_rest(p->center[0]), motion_rest(p->center[1])};
+    const struct motion center[2] = {motion_rest(p->x_center), motion_rest(p->y_center)};
     const struct motion radius = motion_rest(p->radius);
     const struct motion across = cross(e, center);
     const struct motion along = dot(e, center);
@@ -198,22 +197,23 @@ static inline void circle(const struct rp_trajectory_parameters *p, real time,
     const struct motion e[2] = {motion_cosine(phase), motion_sine(phase)};
     const struct motion e_start[2] = {motion_cosine(start_phase), motion_sine(start_phase)};
 
+    const real center[2] = {p->x_center, p->y_center};
     real start[2];
     for (int i = 0; i < 2; i++) {
-        point->ee[i] = motion_sum(motion_rest(p->center[i]), motion_scaled(p->radius, e[i]));
-        start[i] = p->center[i] + p->radius * e_start[i].position;
+        point->ee[i] = motion_sum(motion_rest(center[i]), motion_scaled(p->radius, e[i]));
+        start[i] = center[i] + p->radius * e_start[i].position;
     }
     const struct motion start_polar = polar_on_circle(p, start_phase, e_start);
     inverse_kinematics(p, polar_on_circle(p, phase, e), start, start_polar.position, point);
 }
 
-/* The motion at a time (s), with parameters that passed rp_trajectory_check. Where two segments of
- * the motion meet, the formulas of the later one hold. */
+/* The motion at a time (s), with parameters that passed the checks of rp_trajectory.toml. Where two
+ * segments of the motion meet, the formulas of the later one hold. */
 static inline void trajectory_evaluate(const struct rp_trajectory_parameters *p, real time,
                                        struct trajectory_point *point) {
-    if (p->motion == RP_TRAJECTORY_POINT_TO_POINT) {
+    if (p->motion == RP_TRAJECTORY_MOTION_POINT_TO_POINT) {
         point_to_point(p, time, point);
-    } else if (p->motion == RP_TRAJECTORY_LINE) {
+    } else if (p->motion == RP_TRAJECTORY_MOTION_LINE) {
         line(p, time, point);
     } else {
         circle(p, time, point);

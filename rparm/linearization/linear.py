@@ -13,7 +13,7 @@ from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import PARAMETERS, Model, Value, Variable
 from rparm.linearization import sampling
-from rparm.linearization.sampling import Tick, held_numbers, hold, law, samplers, ticks
+from rparm.linearization.sampling import Tick, held_numbers, hold, law, samplers, ticking, ticks
 from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.units import typed_quantity
 
@@ -344,7 +344,7 @@ def linear_model(instance: Instance) -> Linear:
     if modulated := instance.fmu.notes("modulated"):
         why = "when it switches depends on inputs or states, which no linear model shows"
         raise UserError(f"{instance.name}: {modulated[0]}: {why}: give it the mean over a period")
-    known, declared = model.variables, samplers(model)
+    known, declared = model.variables, ticking(instance)
     inputs = [n for n, v in known.items() if v.causality == "input" and v.type == "Real"]
     kept = held_numbers(model, declared)
     states = (*model.states, *kept)

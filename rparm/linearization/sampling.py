@@ -88,6 +88,16 @@ def samplers(model: Model) -> list[Sampler]:
     return [found[number] for number in sorted(found)]
 
 
+def ticking(instance: Instance) -> list[Sampler]:
+    """Return the samplers of an initialized instance whose period is not 0: the others rest."""
+    declared = samplers(instance.fmu.model)
+    periods = instance.reals([sampler.times["period"] for sampler in declared])
+    with instance.explained("at the point"):
+        periods.get()
+    pairs = zip(declared, periods.view.tolist(), strict=True)
+    return [sampler for sampler, period in pairs if period]
+
+
 def held_numbers(model: Model, every: Sequence[Sampler]) -> list[str]:
     """Return the discrete variables that samplers set, in the order of the model."""
     given = {target for sampler in every for target in sampler.new}.difference(model.states)

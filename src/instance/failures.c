@@ -39,8 +39,8 @@ static void add_expression(struct explanation *to, const char *text) {
 
 /* ---- Names ---------------------------------------------------------------------------------- */
 
-/* Returns the variable of type float64 at this offset or, unless it is NULL, with this name; NULL
- * if there is none. */
+/* Returns the variable at this offset or, unless it is NULL, with this name; NULL if there is none.
+ */
 static const struct variable *find(const struct instance *instance, size_t offset, const char *name,
                                    size_t length) {
     const struct model_description *description = instance->description;
@@ -49,7 +49,7 @@ static const struct variable *find(const struct instance *instance, size_t offse
         const bool fits = name == NULL ? variable->offset == offset
                                        : strlen(variable->name) == length &&
                                              strncmp(variable->name, name, length) == 0;
-        if (fits && variable->owner == VARIABLE_OF_MODEL && variable->type == VARIABLE_FLOAT64) {
+        if (fits && variable->owner == VARIABLE_OF_MODEL) {
             return variable;
         }
     }
@@ -85,12 +85,14 @@ static const struct variable *next_variable(const struct instance *instance, con
         while (is_in_name((*text)[length])) {
             length++;
         }
+        const size_t base = length;
         if (length > 0 && (*text)[length] == '[') {
             length += strcspn(*text + length, "]");
             length += (*text)[length] == ']';
         }
         if (length > 0) {
             found = find(instance, 0, *text, length);
+            length = found != NULL ? length : base; // indexes may be variables
             found = is_rate && found != NULL ? rate_of(instance, found) : found;
             is_rate = strncmp(*text, "der(", strlen("der(")) == 0;
         }
@@ -99,8 +101,15 @@ static const struct variable *next_variable(const struct instance *instance, con
     return found;
 }
 
-static double value_at(const struct place *place, size_t offset) {
-    return *(const double *)(const void *)(place->values + offset);
+/* Returns the value of a variable; NAN of a calculated int that has none. */
+static double value_of(const struct place *place, const struct variable *variable) {
+    const void *field = place->values + variable->offset;
+    if (variable->type == VARIABLE_FLOAT64) {
+        return *(const double *)field;
+    }
+    const int value = *(const int *)field;
+    const bool is_calculated = variable->initial == INITIAL_CALCULATED;
+    return is_calculated && value == MODEL_NO_INT ? (double)NAN : value;
 }
 
 static const struct expression *expression_at(const struct place *place, size_t offset) {
@@ -118,7 +127,7 @@ static const struct expression *cause_in(const struct place *place, const char *
     const struct variable *variable;
     while ((variable = next_variable(place->instance, &text)) != NULL) {
         const struct expression *found = expression_at(place, variable->offset);
-        if (found != NULL && !isfinite(value_at(place, variable->offset))) {
+        if (found != NULL && !isfinite(value_of(place, variable))) {
             return found;
         }
     }
@@ -138,7 +147,7 @@ static void add_values(const struct place *place, const char *text, struct expla
         if (is_new) {
             shown[count] = variable;
             add(to, "%s %s = %.17g", count == 0 ? " with" : ",", variable->name,
-                value_at(place, variable->offset));
+                value_of(place, variable));
             count++;
         }
     }
@@ -176,16 +185,21 @@ static void add_name(const struct instance *instance, size_t offset, struct expl
     add(to, "%s%s", is_rate ? "derivative of " : "", variable != NULL ? variable->name : "a value");
 }
 
-/* Adds why the double at this offset of the place's values, or its slope, is not finite. */
+/* Adds why the value at this offset of the place's values, or its slope, is not finite. */
 static void explain_field(const struct place *place, size_t offset, bool is_slope,
                           struct explanation *to) {
     const struct expression *expression = expression_at(place, offset);
+    const struct variable *variable = variable_at(place->instance, offset);
+    const bool is_int = variable != NULL && variable->type != VARIABLE_FLOAT64;
     add_name(place->instance, offset, to);
     if (expression != NULL) {
         add(to, ": ");
         add_expression(to, expression->text);
     }
-    add(to, is_slope ? " has no finite slope at t = %.17g" : " is not finite at t = %.17g",
+    add(to, " %s at t = %.17g",
+        is_slope ? "has no finite slope"
+        : is_int ? "is no number of 32 bits"
+                 : "is not finite",
         place->t);
     if (expression != NULL) {
         add_cause(place, expression->text, to);

@@ -20,5 +20,6 @@ NONNULL void instance_explain_text(struct instance *instance, const char *text,
 NONNULL void instance_explain_step(struct instance *instance, enum status status,
                                    struct explanation *explanation);
 
-/* Returns STATUS_NOT_FINITE, with a message about the double at this offset of the values shown. */
+/* Returns STATUS_NOT_FINITE, with a message about the double or int at this offset of the values
+ * shown. */
 NONNULL enum status instance_field_not_finite(struct instance *instance, size_t offset);

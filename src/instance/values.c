@@ -231,6 +231,12 @@ enum status instance_get_real(struct instance *instance, const unsigned referenc
     return STATUS_OK;
 }
 
+static int read_int(struct instance *instance, unsigned reference) {
+    const struct shown shown = shown_in(instance);
+    const void *field = instance_field(instance, variable_of(instance->description, reference));
+    return *(const int *)shown_at(&shown, &instance->reals[reference], field);
+}
+
 /* Checks that all variables can be read, and brings their values up to date. */
 static enum status prepare_ints(struct instance *instance, enum array array,
                                 const unsigned references[], size_t count) {
@@ -246,14 +252,13 @@ static enum status prepare_ints(struct instance *instance, enum array array,
                 return status;
             }
         }
+        const bool is_calculated = instance->reals[reference].is_calculated;
+        if (is_calculated && read_int(instance, reference) == MODEL_NO_INT) {
+            return instance_field_not_finite(instance,
+                                             variable_of(instance->description, reference)->offset);
+        }
     }
     return STATUS_OK;
-}
-
-static int read_int(struct instance *instance, unsigned reference) {
-    const struct shown shown = shown_in(instance);
-    const void *field = instance_field(instance, variable_of(instance->description, reference));
-    return *(const int *)shown_at(&shown, &instance->reals[reference], field);
 }
 
 /* In the conversion to bool an int that is not 0 gives true. */

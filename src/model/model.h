@@ -4,6 +4,7 @@
 
 #include "status.h"
 
+#include <limits.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -191,9 +192,12 @@ extern const struct band_solver integrator_band_solver;
 
 /* ---- Texts ---------------------------------------------------------------------------------- */
 
+/* A calculated int whose expression has no value, or none that an int holds. */
+#define MODEL_NO_INT INT_MIN
+
 /* An expression of the file from which a model is made, for messages about its value. */
 struct expression {
-    size_t offset; /* of the double of the value structure that gets its value */
+    size_t offset; /* of the double or int of the value structure that gets its value */
     const char *text;
 };
 

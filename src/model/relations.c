@@ -235,10 +235,14 @@ static double *discrete_of(const struct call *call) {
     return (double *)(void *)((char *)call->values + call->model->discrete.offset);
 }
 
-/* Returns the time of a sampler's next tick, s: never a sum of periods, which would drift. */
+/* Returns the time of a sampler's next tick, s: never a sum of periods, which would drift. INFINITY
+ * with a period of 0. */
 static double tick_time(const struct relations *model, struct relations_room room,
                         const void *values, int sampler) {
     const double *discrete = discrete_in(model, values);
+    if (room.every[sampler] == 0.0) {
+        return INFINITY;
+    }
     return discrete[0] + (room.offset[sampler] + discrete[1 + sampler] * room.every[sampler]);
 }
 
@@ -323,7 +327,7 @@ static enum status refuse(const struct call *call, const struct event *event,
 static enum status check_counts(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
     for (int i = 0; i < model->count_count; i++) {
-        if (call->segments[model->segment_count + i] == RELATIONS_NO_COUNT) {
+        if (call->segments[model->segment_count + i] == MODEL_NO_INT) {
             if (event->reason != NULL) {
                 (void)snprintf(event->reason, event->reason_size, "%s is beyond %d",
                                model->count[i].name, INT_MAX);
@@ -514,21 +518,24 @@ static void pass(const struct call *call, const struct event *event) {
     }
 }
 
-/* Returns true if a sampler with this period and offset (s) can tick from the time t (s) on;
- * otherwise writes the reason. */
-static bool can_tick(const char *name, double every, double offset, const struct event *event) {
+/* Returns true if a sampler with this period and offset (s) can tick from the time of the event on,
+ * or never does since its period is 0; otherwise writes the reason. */
+static bool can_tick(const struct relations *model, int sampler, double every, double offset,
+                     const struct event *event) {
     const double shortest = fmax(event_shortest_period(event->t), shortest_period);
-    if (every >= shortest && isfinite(every) && offset >= 0.0 && isfinite(offset)) {
+    const bool is_possible = every == 0.0 || (every >= shortest && isfinite(every));
+    if (is_possible && offset >= 0.0 && isfinite(offset)) {
         return true;
     }
     if (event->reason != NULL && !(offset >= 0.0 && isfinite(offset))) {
         (void)snprintf(event->reason, event->reason_size,
-                       "%s: offset = %g s is refused: it must be 0 or more", name, offset);
+                       "%s: offset = %g s is refused: it must be 0 or more",
+                       model->change_names[model->event_count + sampler], offset);
     } else if (event->reason != NULL) {
         (void)snprintf(event->reason, event->reason_size,
-                       "%s: every = %g s is refused: at a start time of %g s it must be "
-                       "%g s or more",
-                       name, every, event->t, shortest);
+                       "%s = %g s is refused: at a start time of %g s it must be %g s or more, "
+                       "or 0",
+                       model->every_names[sampler], every, event->t, shortest);
     }
     return false;
 }
@@ -539,8 +546,7 @@ static enum status start_samplers(const struct call *call, const struct event *e
     const struct relations *model = call->model;
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
-        if (!can_tick(model->change_names[model->event_count + i], call->room.every[i],
-                      call->room.offset[i], event)) {
+        if (!can_tick(model, i, call->room.every[i], call->room.offset[i], event)) {
             return STATUS_INVALID_PARAMETERS;
         }
     }

@@ -3,7 +3,7 @@
  *
  * A relation compares two values; its mode says whether it holds, and changes at events only. An
  * event of the model fires when its condition becomes true. A sampler ticks at the times start +
- * (offset + k every), k = 0, 1, ... */
+ * (offset + k every), k = 0, 1, ...; with a period of 0 it never does. */
 #pragma once
 
 #include "model.h"
@@ -76,6 +76,7 @@ struct relations {
     const struct count *count;
     const double *nominal;           /* of each state */
     const char *const *change_names; /* of events, then of samplers */
+    const char *const *every_names;  /* of the period of each sampler */
     const struct assignment *assignment;
     int assignment_count;
 
@@ -134,16 +135,21 @@ static inline int relations_locate(const double begins[], size_t count, double x
     return (int)low;
 }
 
-enum { RELATIONS_NO_COUNT = INT_MIN, RELATIONS_MOST_COUNTED = 1 << 30 };
+enum { RELATIONS_MOST_COUNTED = 1 << 30 };
 
-/* Returns a whole number; RELATIONS_NO_COUNT if an int cannot hold it. */
+/* Returns a whole number; MODEL_NO_INT if an int cannot hold it. */
 static inline int relations_whole(double x) {
-    return fabs(x) <= INT_MAX ? (int)x : RELATIONS_NO_COUNT;
+    return fabs(x) <= INT_MAX ? (int)x : MODEL_NO_INT;
 }
 
 /* Returns the largest whole number up to x, within +-RELATIONS_MOST_COUNTED. */
 static inline int relations_floor(double x) {
     return (int)floor(fmax(-RELATIONS_MOST_COUNTED, fmin(x, RELATIONS_MOST_COUNTED)));
+}
+
+/* Returns the element at a place, a whole number from 0 on; NAN if there is none. */
+static inline double relations_element(const double elements[], int count, double place) {
+    return place >= 0.0 && place < count ? elements[(int)place] : (double)NAN;
 }
 
 /* Error of the time of a time event, over its size. */

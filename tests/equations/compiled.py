@@ -71,7 +71,8 @@ class Model:
         warnings = ["-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-unused-parameter"]
         command = ["cc", "-std=c17", level, "-ffp-contract=off", "-shared", "-fPIC", *warnings]
         shared = ROOT / "src" / "model"
-        sources = [folder / "equations.c", shared / "relations.c", shared / "domains.c"]
+        runtime = [shared / name for name in ("relations.c", "domains.c", "random.c")]
+        sources = [folder / "equations.c", *runtime]
         files = [*sorted(shared.glob("*.?")), folder / "equations.h", folder / "equations.c"]
         texts = [path.read_bytes() for path in files]
         key = build_cache.digest([command, *build_cache.compilers("cc"), *texts])

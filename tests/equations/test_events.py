@@ -448,7 +448,7 @@ def test_start_values_of_discrete_variables_and_periods_can_be_set() -> None:
 @pytest.mark.parametrize(
     ("start", "message"),
     [
-        ({"Ts": 1e-6, "time": 1e9}, "sampler control: every = 1e-06 s is refused"),
+        ({"Ts": 1e-6, "time": 1e9}, "sampler control: every = Ts = 1e-06 s is refused"),
         ({"Kp": 1e308, "target": 1e308}, "sampler control: u = Kp * (target - x) + sum - Kd"),
     ],
 )

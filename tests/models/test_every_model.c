@@ -7,17 +7,14 @@
 #include "rp_controller_model.h"
 #include "rp_plant_model.h"
 #include "rp_plant_modes.h"
-#include "rp_sensor_model.h"
 #include "rp_test_support.h"
-#include "rp_trajectory_example.h"
-#include "rp_trajectory_model.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 #include <unity.h>
 
-enum { PLANT, CONTROLLER, TRAJECTORY, SENSOR, WALL, SUBJECTS };
+enum { PLANT, CONTROLLER, WALL, SUBJECTS };
 enum { DOUBLES = 256, STATES = 4, INPUTS = 10, INDICATORS = 16, ROWS = 64, POINTS = 2000 };
 
 /* A value structure, of any model. */
@@ -25,8 +22,6 @@ union point {
     double all[DOUBLES];
     struct rp_plant_values plant;
     struct rp_controller_values controller;
-    struct rp_trajectory_values trajectory;
-    struct rp_sensor_values sensor;
     struct equations_values wall;
 };
 
@@ -124,34 +119,6 @@ static void place_controller(int n) {
 
 /* What decides a current: the command, the current's limits, the voltage's, or both, beyond the
  * no-load speed. */
-/* Each motion and branch, at rest, in ramps and between; circles beside and around the axis. */
-static void place_trajectory(int n) {
-    static const double times[] = {0.25, 0.875, 1.25, 2.0, 5.0, 7.0};
-    struct rp_trajectory_parameters *p = &at.trajectory.parameters;
-    *p = rp_trajectory_example;
-    p->motion = RP_TRAJECTORY_POINT_TO_POINT + n % 3;
-    p->branch = n / 3 % 2 == 0 ? RP_TRAJECTORY_BACKWARD : RP_TRAJECTORY_FORWARD;
-    p->radius = one_of(2) == 0 ? 0.1 : 0.75;
-    p->frequency *= sign();
-    p->start_angle = 0.25;
-    now = times[n / 6 % 6];
-}
-
-static void place_sensor(int n) {
-    struct rp_sensor_values *v = &at.sensor;
-    v->parameters.latency = n % 3;
-    if (n % 5 == 0) { // no sample has been: counts follow the inputs
-        v->q[0] = v->q[1] = 0.0;
-        v->parameters.noise[0] = v->parameters.noise[1] = 0.0;
-    }
-    for (int k = 0; k < n % 5; k++) {
-        const struct event event = {.t = k == 0 ? 0.0 : model->events->next_time(v),
-                                    .is_timed = k > 0};
-        v->q[0] += 3.0;
-        ASSERT_OK(model->events->update(v, &event));
-    }
-}
-
 /* Pressed; on the way out, where the wall does not pull; outside. */
 static void place_wall(int n) {
     struct equations_values *v = &at.wall;
@@ -176,15 +143,6 @@ static const struct subject subjects[SUBJECTS] = {
      {{0, PLACE(rp_controller_values, parameters.sample_time)},
       {PLACE(rp_controller_values, inputs), PLACE(rp_controller_values, payload_attached)}},
      {{PLACE(rp_controller_values, dintegral), END(rp_controller_values)}}, .place = place_controller},
-    [TRAJECTORY] = {&rp_trajectory_model,
-     {{PLACE(rp_trajectory_values, parameters.l1), PLACE(rp_trajectory_values, payload)}},
-     {{PLACE(rp_trajectory_values, q), PLACE(rp_trajectory_values, payload_attached)}},
-     {offsetof(struct rp_trajectory_values, payload_attached), sizeof(int)}, place_trajectory},
-    [SENSOR] = {&rp_sensor_model,
-     {{0, PLACE(rp_sensor_values, parameters.latency)},
-      {PLACE(rp_sensor_values, q), PLACE(rp_sensor_values, q_measured)}},
-     {{PLACE(rp_sensor_values, q_measured), PLACE(rp_sensor_values, counts)}},
-     {offsetof(struct rp_sensor_values, counts), sizeof(int[2])}, place_sensor},
     [WALL] = {&equations_model, {{0, PLACE(equations_values, v_n_x)}},
      {{PLACE(equations_values, v_n_x), END(equations_values)}}, .place = place_wall},
 };
@@ -448,8 +406,7 @@ static void check(int which) {
 }
 
 static void test_each_model(void) {
-    static const char *const names[SUBJECTS] = {"plant", "controller", "trajectory", "sensor",
-                                                "wall"};
+    static const char *const names[SUBJECTS] = {"plant", "controller", "wall"};
     for (int which = 0; which < SUBJECTS; which++) {
         TEST_MESSAGE(names[which]); // the last one is the one that fails
         check(which);

@@ -17,6 +17,17 @@ CHANGED: dict[tuple[str, str, str], str] = {
     ("RPActuator", "/order/event indicator", "*"): EVENTS,
     **{("RPActuator", f"indicator_{i}", "*"): EVENTS for i in range(1, 9)},
     **{("RPActuator", n, "*"): EVENTS for n in ("event_count", "last_event_time", "max_events")},
+    **{
+        ("RPSensor", f"{name}{joint}{kind}", column): "the latency decides which sample is shown"
+        for name, kind in (("q", "_measured"), ("dq", "_measured"), ("counts", ""))
+        for joint in (1, 2)
+        for column in ("output", "initial unknown")
+    },
+    **{
+        (fmu, name, ""): "models of files with equations have it"
+        for fmu in ("RPSensor", "RPTrajectory")
+        for name in ("event_count", "last_event_time", "max_events")
+    },
 }
 
 each_version = pytest.mark.parametrize("version", PLACES)

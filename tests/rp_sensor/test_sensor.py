@@ -1,7 +1,9 @@
-"""RPSensor.fmu: event mode; counts, velocities and latency, tick by
+"""RPSensor.fmu: event mode; what it counts and refuses; counts, velocities and latency, tick by
 tick, against an independent sensor in fractions."""
 
+import math
 import random
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 from rparm.models.rp_sensor.references.make_references import Encoder
 
+from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from tests.support.instances import instantiated
@@ -236,3 +239,90 @@ def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path) -> None:
             assert sensor.updateDiscreteStates()[-2:] == (True, (k + 1) * 0.125)
             assert sensor.getInt32([reference["counts1"]]) == [k * k]
             sensor.enterStepMode()
+
+
+# ---- Counts --------------------------------------------------------------------------------------
+
+MOST = 2**31 - 1
+
+
+def counted(sensor: Fmu, resolution: float, positions: Sequence[float]) -> list[int]:
+    """Counts of positions of joint 1 during the initialization."""
+    found = []
+    with sensor.instance("sensor", INPUTS) as instance:
+        instance.set_up(0.0, None)
+        instance.set("resolution1", resolution)
+        instance.enter_initialization()
+        for position in positions:
+            instance.set("q1", position)
+            found.append(instance.integer("counts1"))
+    return found
+
+
+@pytest.mark.parametrize("resolution", [0.125, 1e-12, 3e5])
+def test_counts_of_multiples(sensor: Fmu, resolution: float) -> None:
+    numbers = range(-500, 501)
+    assert counted(sensor, resolution, [n * resolution for n in numbers]) == [*numbers]
+
+
+def test_counts_change_halfway(sensor: Fmu) -> None:
+    """With a resolution of 1/8 all quotients are exact."""
+    edges = [((n + 0.5) * 0.125, n + 1) for n in range(-300, 300)]
+    beside = [(math.nextafter(x, -math.inf), n - 1) for x, n in edges]
+    beside += [(math.nextafter(x, math.inf), n) for x, n in edges]
+    for pairs in (edges, beside):
+        assert counted(sensor, 0.125, [x for x, _ in pairs]) == [n for _, n in pairs]
+    # the sum of the first one with 1/2 would be 1
+    small = [0.49999999999999994, -0.5, -0.0, 5e-324, -5e-324, math.nextafter(-0.5, -1.0)]
+    assert counted(sensor, 1.0, small) == [0, 0, 0, 0, 0, -1]
+
+
+def test_the_counter_stops_at_its_ends(sensor: Fmu) -> None:
+    above = [MOST - 0.75, MOST - 0.5, MOST + 0.75, 1e300]
+    assert counted(sensor, 1.0, above) == [MOST - 1, MOST, MOST, MOST]
+    below = [-MOST + 0.5, -MOST + 0.25, -MOST - 0.75, -MOST - 1.0, -1e300]
+    assert counted(sensor, 1.0, below) == [-MOST + 1, -MOST, -MOST, -MOST, -MOST]
+    assert counted(sensor, 1e-12, [1e300, -1e300]) == [MOST, -MOST]
+
+
+def test_velocities_do_not_overflow_a_counter(sensor: Fmu) -> None:
+    with started(sensor, cubics=[(-1e300,), (0.0,)], resolution1=0.25) as instance:
+        assert shown(instance)[0][0] == -MOST
+        instance.set("q1", 1e300)
+        instance.do_step(0.0, 0.001)
+        counts, (q1, _, dq1, _) = shown(instance)
+        assert (counts[0], q1, dq1) == (MOST, MOST * 0.25, 2.0 * MOST * 0.25 / 0.001)
+
+
+def test_the_initialization_shows_what_the_start_will_show(sensor: Fmu) -> None:
+    with sensor.instance("sensor", INPUTS) as instance:
+        for seed in range(50):
+            instance.set_up(0.0, None)
+            for name, value in {"noise1": 3.0, "latency": 5, "seed": seed}.items():
+                instance.set(name, value)
+            instance.enter_initialization()
+            instance.set("q1", float(seed))
+            before = shown(instance)
+            instance.exit_initialization()
+            assert shown(instance) == before and before[1][2] == 0.0
+            instance.reset()
+
+
+@pytest.mark.parametrize(
+    ("start", "values", "said"),
+    [
+        (1e12, {"sample_time": 0.01},
+         "sample_time = 0.01 s is refused: at a start time of 1e+12 s it must be 0.909495 s"),
+        (0.0, {"resolution2": 1e296},
+         "resolution2 = 1e+296 is refused: with sample_time = 0.001 s the velocity of 2^32 counts "
+         "in one sample time is not finite"),
+    ],
+)  # fmt: skip
+def test_what_gives_no_ticks_or_velocities_is_refused(
+    sensor: Fmu, start: float, values: dict[str, float], said: str
+) -> None:
+    with pytest.raises(UserError, match=re.escape(said)), started(sensor, start, **values):
+        pass
+    fits = {name: value / 10 if name != "sample_time" else 0.91 for name, value in values.items()}
+    with started(sensor, start, **fits) as instance:
+        instance.do_step(start, 1.0)

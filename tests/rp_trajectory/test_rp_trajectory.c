@@ -4,9 +4,7 @@
 #include "instance.h"
 #include "last_text.h"
 #include "model_description.h"
-#include "rp_trajectory_equations.h"
-#include "rp_trajectory_example.h"
-#include "rp_trajectory_model.h"
+#include "rp_trajectory.h"
 
 #include <math.h>
 #include <unity.h>
@@ -14,14 +12,40 @@
 static const double pi = 3.14159265358979323846;
 static struct rp_trajectory_parameters p;
 
+/* All parameters have a value, though only those of one motion count. The circle is that of the
+ * start values of rp_trajectory.toml, beside the axis of joint 1. */
+static const struct rp_trajectory_parameters example = {
+    .motion = RP_TRAJECTORY_MOTION_CIRCLE,
+    .branch = RP_TRAJECTORY_BRANCH_FORWARD,
+    .l1 = 0.5,
+    .a = 0.1,
+    .start_time = 0.5,
+    .duration = 1.25,
+    .q1_from = 0.2,
+    .q2_from = -0.1,
+    .q1_to = -1.0,
+    .q2_to = 0.3,
+    .ee_x_from = -0.5,
+    .ee_y_from = 0.2,
+    .ee_x_to = -0.3,
+    .ee_y_to = -0.35,
+    .x_center = 0.4,
+    .y_center = 0.1,
+    .radius = 0.1,
+    .frequency = 0.5,
+    .turns = 2.0,
+    .ramp_time = 1.0,
+};
+
 void setUp(void) {
-    p = rp_trajectory_example;
+    p = example;
     last_text[0] = '\0';
 }
+
 /* The circle that contains the axis of joint 1. */
 static void set_around(void) {
-    p.center[0] = 0.05;
-    p.center[1] = -0.1;
+    p.x_center = 0.05;
+    p.y_center = -0.1;
     p.radius = 0.45;
     p.start_angle = 2.0;
     p.frequency = -0.8;
@@ -35,7 +59,7 @@ static struct trajectory_point at(double t) {
 }
 
 static double end_time(void) {
-    return p.motion == RP_TRAJECTORY_CIRCLE
+    return p.motion == RP_TRAJECTORY_MOTION_CIRCLE
                ? p.start_time + p.turns / fabs(p.frequency) + p.ramp_time
                : p.start_time + p.duration;
 }
@@ -47,61 +71,57 @@ static void test_small_ways_near_an_end_keep_their_digits(void) {
     const double duration = 100.0;
     const double x = 0.02 / duration;
     const double s = x * x * x * (10.0 + x * (-15.0 + x * 6.0));
-    p.motion = RP_TRAJECTORY_POINT_TO_POINT;
+    p.motion = RP_TRAJECTORY_MOTION_POINT_TO_POINT;
     p.start_time = 0.0;
     p.duration = duration;
-    for (int i = 0; i < 2; i++) {
-        p.q_from[i] = 0.0;
-        p.q_to[i] = 1.0;
-    }
+    p.q1_from = 0.0;
+    p.q1_to = 1.0;
     const double first = at(0.02).q[0].position;
     TEST_ASSERT_DOUBLE_WITHIN(1e-12 * s, s, first);
-    p.q_from[0] = -1.0;
-    p.q_to[0] = 0.0;
+    p.q1_from = -1.0;
+    p.q1_to = 0.0;
     const double last = at(duration - 0.02).q[0].position;
     TEST_ASSERT_DOUBLE_WITHIN(1e-9 * s, -s, last);
 }
 
 static void test_ends_are_reached_exactly(void) {
-    p.motion = RP_TRAJECTORY_POINT_TO_POINT;
-    for (int i = 0; i < 2; i++) {
-        TEST_ASSERT_TRUE(at(p.start_time).q[i].position == p.q_from[i]);
-        TEST_ASSERT_TRUE(at(end_time()).q[i].position == p.q_to[i]);
-    }
-    p.motion = RP_TRAJECTORY_LINE;
-    for (int i = 0; i < 2; i++) {
-        TEST_ASSERT_TRUE(at(p.start_time).ee[i].position == p.ee_from[i]);
-        TEST_ASSERT_TRUE(at(end_time()).ee[i].position == p.ee_to[i]);
-    }
-    p.motion = RP_TRAJECTORY_CIRCLE;
+    p.motion = RP_TRAJECTORY_MOTION_POINT_TO_POINT;
+    TEST_ASSERT_TRUE(at(p.start_time).q[0].position == p.q1_from);
+    TEST_ASSERT_TRUE(at(p.start_time).q[1].position == p.q2_from);
+    TEST_ASSERT_TRUE(at(end_time()).q[0].position == p.q1_to);
+    TEST_ASSERT_TRUE(at(end_time()).q[1].position == p.q2_to);
+    p.motion = RP_TRAJECTORY_MOTION_LINE;
+    TEST_ASSERT_TRUE(at(p.start_time).ee[0].position == p.ee_x_from);
+    TEST_ASSERT_TRUE(at(p.start_time).ee[1].position == p.ee_y_from);
+    TEST_ASSERT_TRUE(at(end_time()).ee[0].position == p.ee_x_to);
+    TEST_ASSERT_TRUE(at(end_time()).ee[1].position == p.ee_y_to);
+    p.motion = RP_TRAJECTORY_MOTION_CIRCLE;
     p.turns = 2.25;
-    TEST_ASSERT_DOUBLE_WITHIN(2e-16, p.center[0], at(end_time()).ee[0].position);
-    TEST_ASSERT_DOUBLE_WITHIN(2e-16, p.center[1] + p.radius, at(end_time()).ee[1].position);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-16, p.x_center, at(end_time()).ee[0].position);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-16, p.y_center + p.radius, at(end_time()).ee[1].position);
 }
 
-/* ---- What is refused ------------------------------------------------------------------------ */
+/* ---- Reachability --------------------------------------------------------------------------- */
 
 static void test_distance_of_a_line(void) {
-    double nearest[2];
-    p.motion = RP_TRAJECTORY_LINE;
-    p.ee_from[0] = -1.0;
-    p.ee_to[0] = 2.0;
-    p.ee_from[1] = p.ee_to[1] = 0.25;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.25, rp_trajectory_distance(&p, nearest));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.0, nearest[0]);
-    p.ee_to[0] = -0.3; // ends before the foot of the perpendicular
-    p.ee_to[1] = 0.4;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.5, rp_trajectory_distance(&p, nearest));
-    TEST_ASSERT_TRUE(nearest[0] == -0.3 && nearest[1] == 0.4);
-    p.ee_from[0] = p.ee_to[0]; // a line of no length
-    p.ee_from[1] = p.ee_to[1];
-    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.5, rp_trajectory_distance(&p, nearest));
+    p.ee_x_from = -1.0;
+    p.ee_x_to = 2.0;
+    p.ee_y_from = p.ee_y_to = 0.25;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.25, nearest_of_line(&p).distance);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.0, nearest_of_line(&p).x);
+    p.ee_x_to = -0.3; // ends before the foot of the perpendicular
+    p.ee_y_to = 0.4;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.5, nearest_of_line(&p).distance);
+    TEST_ASSERT_TRUE(nearest_of_line(&p).x == -0.3 && nearest_of_line(&p).y == 0.4);
+    p.ee_x_from = p.ee_x_to; // a line of no length
+    p.ee_y_from = p.ee_y_to;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.5, nearest_of_line(&p).distance);
 }
 
 /* Against the nearest of many points of the swept arc. */
 static void test_distance_of_an_arc(void) {
     for (int i = 0; i < 12 * 6 * 2; i++) {
-        p = rp_trajectory_example;
+        p = example;
         if (i % 2 == 1) {
             set_around();
         }
@@ -113,27 +133,15 @@ static void test_distance_of_an_arc(void) {
         for (int k = 0; k <= count; k++) {
             const double swept = 2.0 * pi * p.turns * k / count;
             const double angle = p.start_angle + (p.frequency < 0.0 ? -swept : swept);
-            const double x = p.center[0] + p.radius * cos(angle);
-            const double y = p.center[1] + p.radius * sin(angle);
+            const double x = p.x_center + p.radius * cos(angle);
+            const double y = p.y_center + p.radius * sin(angle);
             expected = fmin(expected, sqrt(x * x + y * y));
         }
-        double nearest[2];
-        const double distance = rp_trajectory_distance(&p, nearest);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, expected, distance);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-14, distance,
-                                  sqrt(nearest[0] * nearest[0] + nearest[1] * nearest[1]));
+        const struct near_point nearest = nearest_of_circle(&p);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, expected, nearest.distance);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-14, nearest.distance,
+                                  sqrt(nearest.x * nearest.x + nearest.y * nearest.y));
     }
-}
-
-static void test_what_belongs_to_another_motion_is_not_checked(void) {
-    p.frequency = 0.0;
-    p.ramp_time = 1e9;
-    p.motion = RP_TRAJECTORY_LINE;
-    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
-    p.ee_from[0] = p.ee_from[1] = 0.0;
-    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_OUT_OF_REACH, rp_trajectory_check(&p));
-    p.motion = RP_TRAJECTORY_POINT_TO_POINT;
-    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
 }
 
 /* ---- A model without states ------------------------------------------------------------------ */

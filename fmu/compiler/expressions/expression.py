@@ -100,8 +100,10 @@ class Node:
     of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not", "if" (arguments:
     condition, value if true, otherwise), "floor", "hypot", or a name of `FUNCTIONS`. min and max
     have two arguments here.
-    Until `at_indexes` has replaced them: "element" of an array (arguments: its indexes; `name` has
-    {} where they come), "sum" of the `body` over the index `name` (arguments: first and last).
+    "element" of an array by indexes that follow from variables (arguments: the indexes; `name` has
+    {} where they come; behind them, once `with_elements` has added them, the elements in `of`).
+    Until `at_indexes` has replaced them: other elements, and "sum" of the `body` over the index
+    `name` (arguments: first and last).
     `function`: of `FURTHER`, of whose expression it is.
     """
 
@@ -112,6 +114,7 @@ class Node:
     name: str = ""
     body: "Node | None" = None
     function: str = ""
+    of: tuple[tuple[int, ...], ...] = ()
 
 
 def in_order(
@@ -161,6 +164,8 @@ def written(root: Node) -> str:
                 text = f"{'-' if node.op == 'negative' else 'not '}{inner[0]}"
             case "if":
                 text = f"{inner[1]} if {inner[0]} else {texts[2]}"
+            case "element":
+                text = node.name.format(*texts)
             case op if op in BINDING:
                 text = f" {op} ".join(inner)
             case op:
@@ -220,6 +225,14 @@ def with_kinds(
     return items.get(root, root)
 
 
+def kind_of(root: Node, kinds: Mapping[str, Kind]) -> Kind:
+    """Return the kind of an expression, of which `kinds` has the names that are no numbers."""
+    found: dict[Node, Kind] = {}
+    for node in in_order([root]):
+        found[node] = _kind(node, [found[argument] for argument in node.arguments], kinds)
+    return found[root]
+
+
 def _kind(node: Node, given: list[Kind], kinds: Mapping[str, Kind]) -> Kind:
     if node.op == "name":
         return kinds.get(node.name, NUMBER)
@@ -229,6 +242,9 @@ def _kind(node: Node, given: list[Kind], kinds: Mapping[str, Kind]) -> Kind:
         return CONDITION
     if node.op == "if" and not {*given[1:]} <= {NUMBER, WHOLE, CONDITION}:
         return max(given[1:], key=lambda kind: isinstance(kind, tuple))
+    if node.op == "element":
+        elements = {*given[node.name.count("{}") :]}
+        return elements.pop() if len(elements) == 1 else NUMBER
     is_whole = node.op == "number" and node.value.is_integer()
     is_whole |= node.op in KEEP_WHOLE and {*given[node.op == "if" :]} == {WHOLE}
     return WHOLE if is_whole or node.op == "floor" else NUMBER
@@ -242,6 +258,11 @@ def _needed(node: Node, own: Kind, found: Mapping[Node, Kind]) -> list[Kind]:
     if node.op == "if":
         is_item = not {*given[1:]} <= {NUMBER, WHOLE, CONDITION}
         return [CONDITION, *[own if is_item else NUMBER] * 2]
+    if node.op in RANDOM:
+        return [WHOLE] * len(given)
+    if node.op == "element":
+        count = node.name.count("{}")
+        return [WHOLE] * count + [found[node]] * (len(given) - count)
     if node.op in EQUALITIES:
         enumerations = [kind for kind in given if isinstance(kind, tuple)]
         if not enumerations and {*given} not in ({WHOLE}, {CONDITION}):
@@ -307,15 +328,24 @@ class Function:
             body = replace(self, name="").of(given, column)
             return Node("unit", column, (body,), name=table_unit(self.name))
         known = dict(zip(self.arguments, given, strict=True))
-        found: dict[Node, Node] = {}
-        for node in in_order([self.body]):
-            if node.op == "name" and node.name in known:
-                found[node] = known[node.name]
-            else:
-                arguments = tuple(found[argument] for argument in node.arguments)
-                function = self.function or node.function
-                found[node] = replace(node, column=column, arguments=arguments, function=function)
-        return replace(found[self.body], name=UNIT_ONE) if self.has_unit_one else found[self.body]
+        found = with_names(self.body, known, column, self.function)
+        return replace(found, name=UNIT_ONE) if self.has_unit_one else found
+
+
+def with_names(root: Node, known: Mapping[str, Node], column: int = 0, function: str = "") -> Node:
+    """Return an expression with others in the place of names; a column counts for all of it."""
+    found: dict[Node, Node] = {}
+    for node in in_order([root]):
+        if node.op == "name" and node.name in known:
+            found[node] = known[node.name]
+        else:
+            found[node] = replace(
+                node,
+                column=column or node.column,
+                arguments=tuple(found[argument] for argument in node.arguments),
+                function=function or node.function,
+            )
+    return found[root]
 
 
 def table_unit(name: str, argument: int | str = "") -> str:
@@ -341,16 +371,21 @@ class Range:
 
 @dataclass(frozen=True)
 class Lookup:
-    """A table, a function of a C file, floor or hypot: an operation of its own."""
+    """A table, a function of a C file or of `RANDOM`, floor or hypot: an operation of its own.
+
+    optional: how many of the arguments need not be given; they are 0 then.
+    """
 
     name: str
     arguments: tuple[str, ...]
     op: str = "table"
+    optional: int = 0
 
     def of(self, given: Sequence[Node], column: int) -> Node:
         """Return the operation on these arguments."""
         function = self.name if self.op == self.name else ""
-        return Node(self.op, column, tuple(given), name=self.name, function=function)
+        zeros = [Node("number", column)] * (len(self.arguments) - len(given))
+        return Node(self.op, column, (*given, *zeros), name=self.name, function=function)
 
 
 def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -> Node:
@@ -526,8 +561,12 @@ class _Parser:
             separator = ","
         self.expect(")")
         count = len(further.arguments) if further else FUNCTIONS[function.text]
-        if len(arguments) != (max(2, len(arguments)) if count is None else count):
-            wanted = f"{'2 or more' if count is None else count} argument{'s' * (count != 1)}"
+        fewest = 2 if count is None else count - getattr(further, "optional", 0)
+        if not fewest <= len(arguments) <= (count or len(arguments)):
+            numbers = (
+                "2 or more" if count is None else " or ".join(map(str, sorted({fewest, count})))
+            )
+            wanted = f"{numbers} argument{'s' * (count != 1)}"
             text = f"{function.text}: expected {wanted}, got {len(arguments)}"
             raise ExpressionError(function.column, text)
         if further:
@@ -574,20 +613,54 @@ for _name, _arguments, _body in (
     _parts = (tuple(_arguments.split()), parse(_body, _WHOLE), _name == "sign")
     FURTHER[_name] = Function(*_parts, function=_name)
 FURTHER |= {"floor": _WHOLE["whole"], "hypot": Lookup("hypot", ("x", "y"), "hypot")}
+# of files with equations; a function of the same name that the file has is meant instead
+RANDOM = {name: Lookup(name, ("seed", "k", "stream"), name, 1) for name in ("noise", "uniform")}
 
 
 # ---- Indexes -------------------------------------------------------------------------------------
-def at_indexes(root: Node, indexes: Mapping[str, int]) -> Node:
+def at_indexes(root: Node, indexes: Mapping[str, int], are_known: bool = True) -> Node:
     """Replace indexes by their values, elements by their names, and sums by their terms.
 
-    Conditions on indexes alone are decided. ExpressionError where an index is none.
+    Conditions on indexes alone are decided. ExpressionError where an index is none; unless they
+    `are_known`, elements stay whose indexes follow from variables.
     """
-    return _AtIndexes(dict(indexes)).of(root)
+    return _AtIndexes(dict(indexes), are_known).of(root)
+
+
+def with_elements(root: Node, elements: Mapping[str, Collection[tuple[int, ...]]]) -> Node:
+    """Add their elements to the look-ups by indexes that follow from variables.
+
+    elements: indexes of all elements, by the names of arrays. ExpressionError where there are none.
+    """
+    found: dict[Node, Node] = {}
+    for node in in_order([root]):
+        arguments = tuple(found[argument] for argument in node.arguments)
+        new = node if arguments == node.arguments else replace(node, arguments=arguments)
+        if node.op == "element":
+            base, numbers = node.name.partition("[")[0], [*map(_number_of, arguments)]
+            of = [
+                at
+                for at in elements.get(base, ())
+                if len(at) == len(numbers)
+                and all(n in (None, i) for n, i in zip(numbers, at, strict=True))
+            ]
+            if not of:
+                raise ExpressionError(node.column, f"there is no {base} with such indexes")
+            names = (f"{base}[{','.join(map(str, at))}]" for at in of)
+            own = tuple(Node("name", node.column, name=name) for name in names)
+            new = replace(node, arguments=arguments + own, of=tuple(of))
+        found[node] = new
+    return found[root]
+
+
+def _number_of(index: Node) -> int | None:
+    """Return the value of an index; None if it follows from variables."""
+    return None if names(index) else _index(index)
 
 
 class _AtIndexes:
-    def __init__(self, indexes: dict[str, int]) -> None:
-        self.indexes = indexes
+    def __init__(self, indexes: dict[str, int], are_known: bool) -> None:
+        self.indexes, self.are_known = indexes, are_known
         self.count = 0  # of operations
 
     def of(self, root: Node) -> Node:
@@ -606,6 +679,8 @@ class _AtIndexes:
                 decided.add(new)
             elif node.op in ("number", "literal"):
                 fixed.add(new)
+            elif node.op == "element" and not self.are_known and any(map(names, given)):
+                pass  # of variables
             elif node.op == "element":
                 name = node.name.format(*map(_index, given))
                 new = Node("name", node.column, name=name)

@@ -192,6 +192,8 @@ def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Un
         return ONE if node.name else unit
     if node.op == "**":
         return _power(node, given)
+    if node.op == "element":
+        return _same(node, given[-len(node.of) :])
     if node.op == "sqrt":
         return times(ONE, given[0], Fraction(1, 2)) if given[0] is not None else None
     if node.op == "abs":

@@ -5,7 +5,8 @@ one or two arguments; in derivatives also the functions of src/model/slopes.h. C
 mode, relations, and, or, not, isnan, isfinite. abs, min, max and squares have become others.
 From C come the leaf integer, the condition ==, and two operations that differ in derivatives only:
 value_of(x) rests, and moving_as(x, y) moves as y; and the functions ceil, floor, trunc, round.
-Of tables: entry, of an array by one or two segments, and locate, the segment of a number.
+Of tables: entry, of an array by one or two segments, and locate, the segment of a number. Of
+arrays: element, one of the arguments behind the first one, which is its place from 0 on.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not i
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
 OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 SWITCHING = ("floor", "locate", *RELATIONS)  # results jump
-STILL = (*CONDITIONS, "value_of", "entry", "locate", "floor")  # derivatives are 0
+RANDOM = ("noise", "uniform")  # of whole numbers
+STILL = (*CONDITIONS, *RANDOM, "value_of", "entry", "locate", "floor")  # derivatives are 0
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 MOST_COUNTED = 2**30  # by floor of what moves
 WHOLE_UP_TO = 64  # whole exponents whose derivatives are defined at 0
@@ -133,6 +135,7 @@ class Graph:
     looked_up: dict[Value, tuple[Table, list[Value]]] = field(default_factory=dict)  # at instants
     of_inputs: dict[Value, bool] = field(default_factory=dict)  # of distances
     has_switches: bool = True  # else relations are evaluated with the values
+    has_times: bool = False  # without switches: relations of the time with constants are some
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
 
     @property
@@ -201,6 +204,8 @@ class Graph:
                     value = self.value("not", self.value("==", *given))
                 case "table":
                     value = self.in_table(self.tables[node.name], given, is_instant)
+                case "element":
+                    value = self._element(node, given)
                 case "call":
                     value = self.functions[node.name](given, is_instant)
                 case "unit":
@@ -210,6 +215,35 @@ class Graph:
             found[node] = value
             self.nodes += [node] * (len(self.relations) - len(self.nodes))
         return found[root]
+
+    def _element(self, node: Node, given: list[Value]) -> Value:
+        """The element at indexes that follow from variables; not a number where there is none."""
+        count = len(given) - len(node.of)
+        indexes, elements = given[:count], given[count:]
+        is_row = count == 1 and node.of == tuple((node.of[0][0] + i,) for i in range(len(node.of)))
+        if is_row and not any(e.moves or e.op in CONDITIONS for e in elements):
+            place = self.simple("-", indexes[0], self.number(float(node.of[0][0])))
+            return self.value("element", place, *elements)
+        places = [
+            reduce(
+                partial(self.value, "and"),
+                (
+                    self.value("==", index, self.number(float(i)))
+                    for index, i in zip(indexes, at, strict=True)
+                    if index.op != "number"
+                ),
+            )
+            for at in node.of
+        ]
+        if elements[0].op in CONDITIONS:
+            chosen = [self.value("and", *pair) for pair in zip(places, elements, strict=True)]
+            value = reduce(partial(self.value, "or"), chosen)
+            self.unknowns[value] = self.value("not", reduce(partial(self.value, "or"), places))
+            return value
+        value = self.number(math.nan)
+        for place, element in zip(places[::-1], elements[::-1], strict=True):
+            value = self.value("if", place, element, value)
+        return value
 
     def in_table(self, table: Table, given: list[Value], is_instant: bool) -> Value:
         """The value of a table, which `looked_up` knows at an instant."""
@@ -316,6 +350,8 @@ class Graph:
     def relation(self, op: str, left: Value, right: Value) -> Value:
         """A comparison of two values: a switch if one of them moves and the graph has switches."""
         if self.has_switches and (left.moves or right.moves):
+            return self.switch(op, left, right)
+        if self.has_times and self._switch(op, left, right).time is not None:
             return self.switch(op, left, right)
         return self.value(op, left, right)
 
@@ -470,6 +506,9 @@ class Graph:
                 return self.negative(d[0])
             case "moving_as":
                 return d[1]
+            case "element":
+                rests = all(is_number(slope, 0.0) for slope in d[1:])
+                return d[1] if rests else self.value("element", a, *d[1:])
             case "if":
                 of_first = y.arguments[1] if is_unknown(y) else d[1]
                 return of_first if of_first is d[2] else self.value("if", a, of_first, d[2])

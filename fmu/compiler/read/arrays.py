@@ -74,8 +74,14 @@ def _name_with_indexes(text: str) -> Node:
     return tree
 
 
-def every(file: ModelFile, text: object) -> list[dict[str, int]]:
-    """List all values of the indexes of a `for`, the last index fastest; once nothing for None."""
+def every(
+    file: ModelFile, text: object, outer: Mapping[str, int] | None = None
+) -> list[dict[str, int]]:
+    """List all values of the indexes of a `for`, the last index fastest; once nothing for None.
+
+    outer: other indexes, with their values.
+    """
+    known = file.sizes | (outer or {})
     found: list[dict[str, int]] = [{}]
     if text is None:
         return found
@@ -83,12 +89,10 @@ def every(file: ModelFile, text: object) -> list[dict[str, int]]:
         if not isinstance(text, str):
             raise ModelFileError(f'expected a range such as "i = 1..n", got {shown(text)}')
         for over in parse_ranges(text):
-            if over.index in (*file.reserved, *file.sizes):
+            if over.index in (*file.reserved, *known):
                 raise ModelFileError(f"{over.index!r} is a name already: expected an index")
             file.indexes.add(over.index)
-            found = [
-                at | {over.index: value} for at in found for value in over.values(file.sizes | at)
-            ]
+            found = [at | {over.index: value} for at in found for value in over.values(known | at)]
             if len(found) > MOST_ELEMENTS:
                 raise ModelFileError(f"more than {MOST_ELEMENTS} elements")
         if not found:

@@ -129,7 +129,8 @@ class Calls(Interpreter):
             raise refused(function.decl, "each argument needs a name")
         arguments = tuple(parameter.name for parameter, _ in parameters)
         place = f"{function.decl.coord.file}:{function.decl.coord.line}"
-        return Called(name, arguments, "call", place, not all(map(is_real, kinds)))
+        is_helper = not all(map(is_real, kinds))
+        return Called(name, arguments, "call", place=place, is_helper=is_helper)
 
     def result(self, function: Called, given: Sequence[Value], is_instant: bool) -> Value:
         """Call a function; is_instant: at an event, where nothing moves."""

@@ -16,6 +16,7 @@ from declaration.schema import Terminal
 from ..expressions.expression import (
     CONDITION,
     NUMBER,
+    RANDOM,
     ExpressionError,
     Function,
     Kind,
@@ -39,6 +40,7 @@ WRITTEN = {  # where files have them
     COUNTS: "discrete",
 }
 BOOLEAN, INTEGER = "Boolean", "Integer"
+FIXED, DISCRETE = "fixed", "discrete"  # variabilities: of parameters, and of what follows
 MOST_OPERATIONS = 1_000_000  # of all expressions
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
@@ -49,7 +51,7 @@ INSTEAD = {
         "samplers are written as [sampled.NAME] with every and set, which see the values before"
     ),
     r"\b(?:noise|random|rand|randn|gauss|normal|uniform)\s*(?:\(|$)": (
-        "noise is not supported: make it outside and give it to an input"
+        "random numbers are noise(seed, k) and uniform(seed, k), of whole numbers"
     ),
 }
 
@@ -75,7 +77,7 @@ class Expression:
     place: tuple[str, ...]
     text: str
     tree: Node
-    kind: Kind = NUMBER
+    kind: Kind | None = NUMBER  # None: any
     target: str = ""  # the variable or mode that it is assigned to; of a period: time
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
@@ -98,8 +100,10 @@ class Variable:
     display: tuple[str, float, float] | None = None  # unit in the file, with factor and offset
     description: str = ""
     derivative_of: str = ""  # the state of which the FMU has it as the derivative
+    variability: str = ""  # "fixed" or "discrete" if the file says so
+    shown: bool = True  # the FMU has it as a variable
     expression: Expression | None = None  # derivative of a state, value of others
-    initial: Expression | None = None  # start value that follows from parameters
+    initial: Expression | None = None  # start value that follows from parameters and inputs
     leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable
     arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
@@ -115,8 +119,8 @@ class Variable:
 
     @property
     def is_real(self) -> bool:
-        """Whether it is neither a condition nor a count nor an enumeration."""
-        return self.section not in (OPTIONS, SWITCHES, COUNTS)
+        """Whether it is neither a condition nor a whole number nor an enumeration."""
+        return self.kind == NUMBER
 
 
 @dataclass
@@ -127,6 +131,7 @@ class Change:
     during: Expression | None  # `while`
     reinit: dict[str, Expression]  # by state
     set: dict[str, Expression]  # by mode or discrete variable
+    where: list[Expression]  # which the others name
 
     @property
     def given(self) -> dict[str, Expression]:
@@ -141,7 +146,7 @@ class Change:
     @property
     def expressions(self) -> list[Expression]:
         """All of them."""
-        return [*self.conditions, *self.given.values()]
+        return [*self.conditions, *self.where, *self.given.values()]
 
 
 @dataclass
@@ -212,8 +217,9 @@ class ModelFile:
                 raise ModelFileError(f"expected an expression in quotes, got {shown(text)}")
             try:
                 if text not in self.parsed:
-                    self.parsed[text] = parse(text, self.functions)
-                tree = at_indexes(self.parsed[text], self.sizes | element.indexes)
+                    self.parsed[text] = parse(text, RANDOM | self.functions)
+                indexes = self.sizes | element.indexes
+                tree = at_indexes(self.parsed[text], indexes, are_known=False)
             except ValueError as error:
                 raise ModelFileError(f"{error}{instead_of(text)}") from None
             nodes = in_order([tree])
@@ -265,6 +271,16 @@ class ModelFile:
         """Variables that follow from others at any time."""
         return self.of(FOLLOWS, "where", "outputs")
 
+    @property
+    def calculated_reals(self) -> list[Variable]:
+        """Those that are real numbers, and that the FMU shows."""
+        return [v for v in self.calculated if v.is_real and v.shown]
+
+    @property
+    def calculated_counts(self) -> list[Variable]:
+        """Those that are conditions, whole numbers or enumerations, and that the FMU shows."""
+        return [v for v in self.calculated if not v.is_real and v.shown]
+
     @cached_property
     def places(self) -> dict[str, int]:
         """Places of the time and of the variables in the order of the file."""
@@ -272,7 +288,7 @@ class ModelFile:
 
     @property
     def started(self) -> list[Variable]:
-        """States and discrete variables whose start values follow from parameters."""
+        """States and discrete variables whose start values follow from parameters and inputs."""
         return [v for v in self.of("states", "discrete", COUNTS) if v.initial is not None]
 
     @property
@@ -284,9 +300,19 @@ class ModelFile:
     @property
     def constant(self) -> list[Expression]:
         """All expressions of parameters only."""
-        found = [v.expression for v in self.of(FOLLOWS)] + [v.initial for v in self.started]
+        found = [v.expression for v in self.of(FOLLOWS)]
         found += [e for s in self.sampled for e in s.periods]
-        return found + [condition for _, condition in self.checks]
+        return found
+
+    @property
+    def checked(self) -> list[Expression]:
+        """Conditions on parameters and on what follows from them."""
+        return [condition for _, condition in self.checks]
+
+    @property
+    def initial(self) -> list[Expression]:
+        """All start values that follow from parameters and inputs."""
+        return [v.initial for v in self.started]
 
     def place_of(self, name: str) -> str:
         """Return the section that has a name."""

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from ..expressions.expression import (
     Node,
     in_order,
     with_kinds,
+    with_names,
 )
 from ..expressions.units import ANGLE, BASE, Measure, table_unit, unit_of, unit_of_exponents
 from ..graph.tables import read as table_of
@@ -33,6 +35,8 @@ from .code import read as read_code
 from .content import (
     BOOLEAN,
     COUNTS,
+    DISCRETE,
+    FIXED,
     FOLLOWS,
     SWITCHES,
     Element,
@@ -251,6 +255,10 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
         texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
         _set_start(section, given, texts)
         variable = Variable(element.name, section, **given)
+        wanted = DISCRETE if section in keys.CALCULATED else FIXED
+        if variable.variability not in ("", wanted):
+            said = shown(variable.variability)
+            raise ModelFileError(f'variability: expected "{wanted}", got {said}')
         _set_unit(variable, file)
         _check_range(variable)
     for key, text in texts.items():
@@ -259,6 +267,7 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
         expression = file.expression(element, whole, text, *options)
         if key == "start":
             variable.initial = expression
+            expression.event = "then"  # inputs jump at the start
         else:
             variable.expression = expression
     if section in header.CALCULATED and not texts:
@@ -299,7 +308,8 @@ def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> No
     """Read a start value by its kind; one that follows from parameters goes into the texts."""
     kind, start = given.get("kind", NUMBER), given.get("start")
     if isinstance(kind, tuple) and (start is None or start in kind):
-        given["start"] = kind.index(start or kind[0]) + 1
+        if section not in keys.CALCULATED:
+            given["start"] = kind.index(start or kind[0]) + 1
         return
     wanted = "true or false" if kind == CONDITION else kind
     if isinstance(kind, tuple):
@@ -415,30 +425,69 @@ def _change(
 
 def _given(
     file: ModelFile, element: Element, place: str, given: dict[str, Any], event: str
-) -> tuple[Expression | None, dict[str, Expression], dict[str, Expression]]:
-    """Return `while`, `reinit` and `set`; event: of the expression of `while`."""
+) -> tuple[Expression | None, dict[str, Expression], dict[str, Expression], list[Expression]]:
+    """Return `while`, `reinit`, `set` and `where`; event: of the expression of `while`."""
     kinds = {
         "reinit": (("states",), "a state"),
         "set": (("discrete", COUNTS), "one of modes or of [discrete]"),
     }
     found: dict[str, dict[str, Expression]] = {"reinit": {}, "set": {}}
+    where, local = _local(file, element, place, given.get("where", {}))
     for key, (sections, what) in kinds.items():
-        for written, text in given.get(key, {}).items():
+        for written, text, own in _each(file, element, place, key, given.get(key, {})):
             whole = (place, f"{key}: {written}")
             with placed(*whole):
-                name = target(written, element, file.sizes)
+                name = target(written, own, file.sizes)
+                if name in found[key]:
+                    raise ModelFileError(f"{name} has a new value already")
             variable = file.variables.get(name)
             is_mode = key == "set" and name in file.modes
             if not is_mode and (variable is None or variable.section not in sections):
                 hint = _hint(variable, name in file.modes)
                 raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(name)}{hint}")
             kind = CONDITION if is_mode else variable.kind
-            found[key][name] = file.expression(element, whole, text, kind, name, event="then")
+            new = file.expression(own, whole, text, kind, name, event="then")
+            new.tree = with_names(new.tree, local)
+            found[key][name] = new
     during = None
     if "while" in given:
         whole = (place, "while")
         during = file.expression(element, whole, given["while"], CONDITION, event=event)
-    return during, found["reinit"], found["set"]
+    return during, found["reinit"], found["set"], where
+
+
+def _each(
+    file: ModelFile, element: Element, place: str, key: str, entries: dict[str, object]
+) -> Iterator[tuple[str, object, Element]]:
+    """Yield key, expression and indexes of each new value: an entry may be a table with `for`."""
+    for written, entry in entries.items():
+        if not isinstance(entry, dict):
+            yield written, entry, element
+            continue
+        with placed(place, f"{key}: {written}"):
+            given = keys.entries(entry, ("value", FOR), "value")
+            over = every(file, given.get(FOR), element.indexes)
+        for at in over:
+            yield written, given["value"], replace(element, indexes=element.indexes | at)
+
+
+def _local(
+    file: ModelFile, element: Element, place: str, entries: dict[str, object]
+) -> tuple[list[Expression], dict[str, Node]]:
+    """Return the expressions of `where` of an event or sampler, and what their names stand for."""
+    found: list[Expression] = []
+    known: dict[str, Node] = {}
+    for name, text in entries.items():
+        whole = (place, f"where: {_named(name)}")
+        with placed(*whole):
+            _check_name(name, file)
+            if name in (*file.indexes, *element.indexes):
+                raise ModelFileError("this name is an index of for, too")
+        own = file.expression(element, whole, text, None, event="then")
+        own.tree = with_names(own.tree, known)
+        known[name] = own.tree
+        found.append(own)
+    return found, known
 
 
 def _hint(variable: Variable | None, is_mode: bool) -> str:

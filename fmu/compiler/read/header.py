@@ -37,7 +37,7 @@ class Field:
     def c_type(self) -> str:
         """Its type in C."""
         kind = self._type
-        if isinstance(kind, list):
+        if isinstance(kind, list | dict):
             return f"enum {self.prefix}_{self.name}"
         return "int" if kind in (BOOLEAN, INTEGER) else "double"
 
@@ -63,7 +63,7 @@ class Field:
 
     def enum(self) -> Iterator[str]:
         """Yield the enum of its type, if it needs one."""
-        if isinstance(self._type, list):
+        if isinstance(self._type, list | dict):
             head = f"{self.prefix}_{self.name}".upper()
             yield f"enum {self.prefix}_{self.name} {{"
             for number, item in enumerate(self._type, 1):

@@ -4,7 +4,7 @@ Every mistake is a ModelFileError or a ValueError, in one line.
 """
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 from declaration.load import shown
@@ -43,22 +43,28 @@ CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\u
 RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 TAKEN = {*RESERVED, *FURTHER, "sum", "der"}  # no names of functions
 NUMBERS = ("start", "min", "max", "nominal")
+CALCULATED = ("where", "outputs")
+OF_VALUES = ("value", "unit", "description", "variability", "derivative_of")
+OF_COUNTS = ("type", "value", "min", "max", "description")
 OF_ALL = ("start", "unit", "min", "max", "description")
 SECTIONS = {  # keys of their entries, and the one that each needs
-    "parameters": ((*OF_ALL, "type"), "start"),
+    "parameters": ((*OF_ALL, "type", "variability"), "start"),
     "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative", "derivative_of"), "derivative"),
-    "discrete": (("start", "unit", "description", "type"), ""),
-    "where": (("value", "unit", "description", "derivative_of"), "value"),  # or expressions
-    "outputs": (("value", "unit", "description", "derivative_of"), "value"),
+    "discrete": (("start", "unit", "description", "type", "shown"), ""),
+    "where": ((*OF_VALUES, "type", "shown"), "value"),  # or expressions
+    "outputs": ((*OF_VALUES, "type"), "value"),
 }
 OWN_KEYS = {
     FOLLOWS: (("value", "unit", "description"), "value"),
-    OPTIONS: (("type", "start", "min", "max", "description"), "start"),
+    OPTIONS: (("type", "start", "min", "max", "description", "variability"), "start"),
     SWITCHES: (("type", "start", "description"), ""),
-    COUNTS: (("type", "start", "min", "max", "description"), ""),
+    COUNTS: (("type", "start", "min", "max", "description", "shown"), ""),
+    "where": ((*OF_COUNTS, "shown"), "value"),
+    "outputs": (OF_COUNTS, "value"),
 }
 NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
+NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
     *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
     *("functions", "sampled", "events", "check", "terminals"),
@@ -66,8 +72,8 @@ HEAD = (
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
 TABLE = ("x", "y", "z", "file", "interpolation", "outside")
-EVENT = ("when", "while", "reinit", "set")
-SAMPLER = ("every", "offset", "while", "reinit", "set")
+EVENT = ("when", "while", "where", "reinit", "set")
+SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
 NO_TABLES = ("name", "description", "include", "modes", "code")
 TABLES = ("reinit", "set", *(key for key in HEAD if key not in NO_TABLES))
@@ -126,13 +132,26 @@ def _modes(value: Any) -> list[tuple[str, Any]]:
         raise ValueError("expected a list of names, or a table of true and false") from None
 
 
+class Items(tuple[str, ...]):
+    """The items of an enumeration, with their descriptions."""
+
+    descriptions: dict[str, str]
+
+    def __new__(cls, given: Iterable[str]) -> "Items":
+        """Take the items, of a table with their descriptions."""
+        found = super().__new__(cls, given)
+        texts = given if isinstance(given, dict) else {}
+        found.descriptions = {item: plain_text(texts.get(item, item)) for item in found}
+        return found
+
+
 def _type(value: Any) -> Kind:
     """Return the kind of variables of a type."""
     if value in (BOOLEAN, INTEGER):
         return CONDITION if value == BOOLEAN else WHOLE
-    are_texts = isinstance(value, list) and value and all(type(item) is str for item in value)
+    are_texts = isinstance(value, list | dict) and value and all(type(x) is str for x in value)
     if are_texts and len({*value}) == len(value) and all(map(NAME.fullmatch, value)):
-        return tuple(value)
+        return Items(value)
     raise ValueError(f'expected "{BOOLEAN}", "{INTEGER}" or a list of different names')
 
 
@@ -151,6 +170,8 @@ READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
     "type": _type,
+    "variability": TEXT,
+    "shown": _expect("true or false", bool, lambda _: True),
     "description": plain_text,
     "unit": _unit,
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),

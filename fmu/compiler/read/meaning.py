@@ -7,18 +7,21 @@ from graphlib import CycleError, TopologicalSorter
 from declaration.load import shown
 
 from ..expressions.expression import (
+    CONDITION,
     CONSTANTS,
     ExpressionError,
     derivative_of,
     evaluated,
     in_order,
+    kind_of,
     names,
+    with_elements,
     with_kinds,
 )
 from ..expressions.hints import meant
 from ..expressions.units import BASE, Unit, times, unit_of, unit_of_exponents
 from ..expressions.units import shown as unit_shown
-from .content import FOLLOWS, OPTIONS, Expression, ModelFile, ModelFileError, placed
+from .content import FOLLOWS, OPTIONS, SWITCHES, Expression, ModelFile, ModelFileError, placed
 
 SECOND = unit_of_exponents({"s": 1})
 SHORTEST = 1e-12  # s, of periods
@@ -27,26 +30,45 @@ MOST_COMPARED = 1000  # names that may have been meant
 
 def check(file: ModelFile) -> None:
     """Check all expressions, and order them: each after those that it names; ModelFileError."""
+    _add_elements(file)
     _check_names(file)
     _check_derivatives(file)
     file.order = _in_order(file)
+    _check_kinds(file)
     _check_periods(file)
     if file.has_units:
         _check_units(file)
 
 
+def _add_elements(file: ModelFile) -> None:
+    """Add their elements to look-ups by indexes that follow from variables."""
+    elements: dict[str, list[tuple[int, ...]]] = {}
+    for name in (*file.variables, *file.modes):
+        base, bracket, rest = name.partition("[")
+        if bracket:
+            at = tuple(map(int, rest.rstrip("]").split(",")))
+            elements.setdefault(base, []).append(at)
+    for expression in [*file.assigned, *file.constant, *file.initial, *file.checked]:
+        with placed(*expression.place):
+            if any(node.op == "element" for node in in_order([expression.tree])):
+                expression.tree = with_elements(expression.tree, elements)
+
+
 def _check_names(file: ModelFile) -> None:
-    """Check the names and kinds in all expressions."""
+    """Check the names in all expressions."""
     rates = [derivative_of(state.name) for state in file.of("states")]
     known = dict.fromkeys((*file.variables, *file.modes, "time", *CONSTANTS, *rates))
     constant = file.of("parameters", FOLLOWS, OPTIONS)
     parameters = dict.fromkeys((*(v.name for v in constant), *CONSTANTS))
-    kinds = file.kinds
     for index in file.indexes & known.keys():
         raise ModelFileError(f"{file.place_of(index)}: {index}: this name is an index of for, too")
+    inputs = dict.fromkeys(variable.name for variable in file.of("inputs", SWITCHES))
+    where = dict.fromkeys(variable.name for variable in file.of("where"))
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
         (file.constant, parameters, "{} is no parameter"),
+        (file.initial, parameters | inputs, "{} is no parameter or input"),
+        (file.checked, parameters | where, "{} is no parameter"),
     ):
         for expression in expressions:
             with placed(*expression.place):
@@ -54,7 +76,19 @@ def _check_names(file: ModelFile) -> None:
                     if node.op == "name" and node.name not in allowed:
                         hint = _hint(node.name, allowed, file)
                         raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
-                expression.tree = with_kinds(expression.tree, expression.kind, kinds)
+
+
+def _check_kinds(file: ModelFile) -> None:
+    """Check the kinds in all expressions; an entry of [where] that is a condition is Boolean."""
+    kinds = file.kinds
+    plain = {v.expression: v for v in file.of("where") if v.is_real and not v.unit}
+    for expression in file.order:
+        with placed(*expression.place):
+            if expression in plain and kind_of(expression.tree, kinds) == CONDITION:
+                plain[expression].kind = expression.kind = CONDITION
+                kinds[expression.target] = CONDITION
+            kind = expression.kind or kind_of(expression.tree, kinds)
+            expression.tree = with_kinds(expression.tree, kind, kinds)
 
 
 def _check_derivatives(file: ModelFile) -> None:
@@ -107,13 +141,14 @@ def _in_order(file: ModelFile) -> list[Expression]:
         ) from None
     variables = in_order(entries.values())
     happening = [expression for change in file.changes for expression in change.expressions]
-    constant = [e for e in file.constant if e.target not in entries]
-    return [*(v.expression for v in variables), *happening, *constant]
+    constant = [e for e in [*file.constant, *file.initial] if e.target not in entries]
+    return [*(v.expression for v in variables), *happening, *constant, *file.checked]
 
 
 def _check_periods(file: ModelFile) -> None:
-    """Check that samplers tick, and starts exist, with the start values of the parameters."""
-    starts = {variable.name: variable.start for variable in file.of("parameters", OPTIONS)}
+    """Check that samplers can tick, and starts exist, with the start values of the parameters."""
+    given = file.of("parameters", OPTIONS, "inputs", SWITCHES)
+    starts = {variable.name: variable.start for variable in given}
     follows = {variable.expression for variable in file.of(FOLLOWS)}
     for expression in file.order:
         if expression in follows and (number := _known_number(expression, starts)) is not None:
@@ -125,8 +160,8 @@ def _check_periods(file: ModelFile) -> None:
     for sampler in file.sampled:
         every, offset = (_number(expression, starts) for expression in sampler.periods)
         with placed(*sampler.every.place):
-            if not SHORTEST <= every < math.inf:
-                wanted = f"expected {SHORTEST:g} s or more"
+            if every != 0 and not SHORTEST <= every < math.inf:
+                wanted = f"expected {SHORTEST:g} s or more, or 0"
                 raise ModelFileError(f"is {every:g} s at the start values, {wanted}")
         with placed(*sampler.offset.place):
             if not 0 <= offset < math.inf:
@@ -170,6 +205,8 @@ def _check_units(file: ModelFile) -> None:
         if expression.target:
             units.setdefault(expression.target, unit)
     for variable in file.of("where"):
+        if not variable.is_real:
+            continue
         with placed("[where]", variable.name):
             variable.exponents = _whole(units[variable.name])
 

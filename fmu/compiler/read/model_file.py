@@ -6,7 +6,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from ..expressions.expression import CONDITION, RELATIONS, Node, derivative_of, written
-from ..graph.graph import Graph, Value
+from ..graph.graph import MOVING, Graph, Value
 from ..names import Fields
 from ..plain_c.memory import is_real
 from ..plain_c.text import CTextError
@@ -14,6 +14,7 @@ from . import file as file_reader
 from .code import Calls
 from .content import (
     COUNTS,
+    FOLLOWS,
     OPTIONS,
     SWITCHES,
     Expression,
@@ -54,6 +55,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
     if calls:
         graph.functions = calls.of(file.code.functions) | _written(file, calls, dict(known))
+    counted, checked = {v.name for v in file.calculated if not v.is_real}, {*file.checked}
     sources: list[Expression] = []  # of each relation
     # right sides last: their conditions are switches of others
     for expression in sorted(file.order, key=lambda expression: expression.event == "then"):
@@ -65,13 +67,22 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
                 graph.nodes += [tree] * (len(graph.relations) - len(graph.nodes))
             else:
                 is_instant = expression.event == "then"
+                graph.has_times = expression.target in counted
                 value = graph.of_tree(tree, known, is_instant)
                 expression.value = graph.passed(value) if is_instant else value
+                if expression in checked:
+                    _check_constant(file, value)
         sources += [expression] * (len(graph.relations) - len(sources))
         if expression.is_rate:
             known[derivative_of(expression.target)] = expression.value
         elif expression.target:
             known.setdefault(expression.target, expression.value)
+    for variable in file.of("where", "outputs"):
+        if variable.variability and variable.value.moves:
+            moving = sorted(name or op for op, name in variable.value.leaves if op in MOVING)
+            with file_reader.located(path, file.text), placed(variable.place, variable.name):
+                what = f"is for what only events change, but {moving[0]} moves"
+                raise ModelFileError(f'variability: "{variable.variability}" {what}')
     places = [source.place for source in sources]
     in_c = calls.relation_texts if calls else {}
     file.relation_texts = [
@@ -83,6 +94,13 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
         for name, node, place in zip(graph.relations, graph.nodes, places, strict=True)
     ]
     return file
+
+
+def _check_constant(file: ModelFile, value: Value) -> None:
+    """Check that a condition follows from parameters only."""
+    known = {v.name for v in file.of("parameters", FOLLOWS, OPTIONS)}
+    if others := sorted(name or op for op, name in value.leaves if name not in known):
+        raise ModelFileError(f"follows from {others[0]}, which is no parameter")
 
 
 def _written(

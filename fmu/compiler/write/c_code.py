@@ -17,6 +17,7 @@ from ..read.content import Expression
 FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", "==", *RELATIONS)}
 FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
 FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}", "hypot": "slopes_hypot({}, {})"}
+FORMULAS |= {"noise": "random_normal({}, {}, {})", "uniform": "random_uniform({}, {}, {})"}
 
 LONGEST = 200  # characters of a text with indexes
 Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name
@@ -56,6 +57,9 @@ def shortened(name: str, expression: Expression, tables: Mapping[str, Table]) ->
         if node.op == "floor":
             of = " of its quotient" if node.function == "mod" else ""
             limits[node.function] = f"up to 2^{MOST_COUNTED.bit_length() - 1}{of}"
+        elif node.op == "element":
+            ends = (",".join(map(str, of)) for of in (node.of[0], node.of[-1]))
+            limits[f"index of {node.name.partition('[')[0]}"] = "..".join(ends)
         elif node.op == "table" and (ends := tables[node.name].ends):
             limits[f"table {node.name}"] = "{:.6g}..{:.6g}".format(*ends)
     shown = "; ".join(f"{what}: {limit}" for what, limit in limits.items())
@@ -108,6 +112,9 @@ class Code:
             return given[0]
         if value.op == "entry":
             return self.constant(value.name + "".join(f"[{index}]" for index in given))
+        if value.op == "element":
+            row = f"(const double[]){{{', '.join(given[1:])}}}, {len(given) - 1}"
+            return self.constant(f"relations_element({row}, {given[0]})")
         if value.op == "locate":
             return self.constant(located(value.name, given[0]), c_type)
         return self.constant(formula(value.op, *given), c_type)

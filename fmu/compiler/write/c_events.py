@@ -79,11 +79,17 @@ class Tick:
 
 
 def ticks(file: ModelFile) -> list[Tick]:
-    """When samplers tick, and what each would set now; the largest double is no finite value."""
+    """When samplers tick, and what each would set now; the largest double is no finite value.
+
+    Those that set what the FMU does not show have none.
+    """
     graph, found, taken = file.graph, [], {*file.variables, *file.modes}
     uncoupled = _uncoupled(file)
     one, zero, largest = map(graph.number, (1.0, 0.0, sys.float_info.max))
+    hidden = {variable.name for variable in file.variables.values() if not variable.shown}
     for i, sampler in enumerate(file.sampled, 1):
+        if hidden & sampler.given.keys():  # what it does shows in part
+            continue
         every, offset = (period.value for period in sampler.periods)
         own = [("every", every, SECOND, "period"), ("offset", offset, SECOND, "offset")]
         for target, given in sampler.given.items():
@@ -183,13 +189,16 @@ class Events:
         opposite = self.graph.value("negative", relation.distance)
         return self.graph.value("if", relation.mode, relation.distance, opposite)
 
-    def fields(self) -> list[str]:
-        """Fields of the value structure: doubles and ints without gaps."""
+    def doubles(self) -> list[str]:
+        """Fields of the value structure."""
+        discrete = declared("double", self.discrete) if self else []
+        return ["/* discrete states */", *discrete] if discrete else []
+
+    def ints(self) -> list[str]:
+        """Fields behind all doubles, without gaps."""
         if not self:
             return []
         return [
-            *(["/* discrete states */"] if self.discrete else []),
-            *declared("double", self.discrete),
             *(["/* inputs */"] if self.file.of(SWITCHES) else []),
             *declared("int", [self.file.fields.count(v.name) for v in self.file.of(SWITCHES)]),
             "/* modes; C has no empty arrays */",
@@ -242,6 +251,7 @@ class Events:
                 + [text(f"sampler {sampler.name}") for sampler in file.sampled]
                 or ["NULL"]
             ),
+            every_names=", ".join(map(text, map(_every_name, file.sampled))) or "NULL",
             assignment=assigned or ["{0},"],
             assignments=len(assigned),
             discrete=", ".join(
@@ -378,16 +388,11 @@ class Events:
         """Statements that give variables and modes the new values, which the code calculates."""
         counted, fields = _counted(self.file), {}
         for name, value in new.items():
-            kind, _ = counted.get(name, ("", 0))
-            found = code.of(value)
-            if kind == CONDITION:
-                fields[self.file.fields.count(name)] = code.constant(f"{found} != 0", "int")
-            elif kind:
-                fields[self.file.fields.count(name)] = code.constant(
-                    f"relations_whole({found})", "int"
-                )
+            if name in counted:
+                whole = count(code, counted[name][0], value)
+                fields[self.file.fields.count(name)] = code.constant(whole, "int")
             else:
-                fields[self.file.fields.value(name)] = code.constant(found)
+                fields[self.file.fields.value(name)] = code.constant(code.of(value))
         return [f"values->{field} = {value};" for field, value in fields.items()]
 
     def _counts(self) -> list[str]:
@@ -428,6 +433,19 @@ class Events:
                 return f"relations_state_indicator({place}, {holds}, {factor}, {offset}, {rate})"
         limit = code.of(relation.limit or zero)
         return f"(struct indicator){{.kind = INDICATOR_OF_MODEL, .offset = fabs({limit})}}"
+
+
+def _every_name(sampler: Sampler) -> str:
+    """Name of a period in messages, with the parameter that it is."""
+    every = sampler.every
+    of = f" = {every.tree.name}" if every.tree.op == "name" else ""
+    return f"sampler {sampler.name}: every{of}"
+
+
+def count(code: Code, kind: Kind, value: Value) -> str:
+    """The int of a condition, whole number or item of an enumeration."""
+    found = code.of(value)
+    return f"{found} != 0" if kind == CONDITION else f"relations_whole({found})"
 
 
 def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:

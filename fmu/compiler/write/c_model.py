@@ -7,9 +7,9 @@ from typing import Any
 from ..expressions.expression import in_order
 from ..graph.band import band
 from ..graph.graph import FALLIBLE, Value, is_number
-from ..read.content import OPTIONS, ModelFile, Variable
+from ..read.content import OPTIONS, ModelFile
 from .c_code import Code, declared, filled, indented, number, shortened, text
-from .c_events import Events, arrays, leaves, ticks
+from .c_events import Events, arrays, count, leaves, ticks
 from .c_series import Series
 from .rolled import rolled
 
@@ -37,7 +37,7 @@ def header(file: ModelFile) -> str:
     """Return the text of equations.h."""
     events = Events(file)
     groups = _ranges(file) | {
-        "calculated": [file.fields.value(v.name) for v in file.calculated],
+        "calculated": [file.fields.value(v.name) for v in file.calculated_reals],
         "event indicators": list(events.indicators()),
         "samplers": [tick.field for tick in ticks(file)],
     }
@@ -46,7 +46,9 @@ def header(file: ModelFile) -> str:
         fields += [f"/* {title} */", *declared("double", names)] if names else []
         if title == "parameters":
             fields += declared("int", _options(file))
-    return filled("equations.h.in", fields=fields + events.fields())
+    counts = declared("int", [file.fields.count(v.name) for v in file.calculated_counts])
+    fields += events.doubles() + (["/* calculated, no real numbers */"] if counts else []) + counts
+    return filled("equations.h.in", fields=fields + events.ints())
 
 
 def source(file: ModelFile) -> str:
@@ -78,7 +80,8 @@ def source(file: ModelFile) -> str:
 def _expressions(file: ModelFile) -> list[str]:
     """Rows of struct expression."""
     fields = [(file.fields.rate(x.name), x) for x in file.of("states")]
-    fields += [(file.fields.value(v.name), v) for v in file.calculated]
+    fields += [(file.fields.value(v.name), v) for v in file.calculated_reals]
+    fields += [(file.fields.count(v.name), v) for v in file.calculated_counts]
     return [
         f"{{offsetof({STRUCTURE}, {name}), {shortened('', variable.expression, file.tables)}}},"
         for name, variable in fields
@@ -203,7 +206,7 @@ def _domains(
         names = ("domains_header", "domains_declared", "domains")
         return {"in_domain": "", **{name: [] for name in names}}
     ranges = _ranges(file)
-    calculated = ranges["derivatives"] + [file.fields.value(v.name) for v in file.calculated]
+    calculated = ranges["derivatives"] + [file.fields.value(v.name) for v in file.calculated_reals]
     groups = {key: ranges[key] for key in ("states", "inputs")}
     groups |= {"calculated": calculated, "indicators": list(events.indicators())}
     distances = {f"distance[{i}]": r.distance for i, r in enumerate(events.relations)}
@@ -234,7 +237,7 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
     """Calculated fields and their derivatives along a curve."""
     graph = file.graph
     fields = {file.fields.rate(state.name): state.value for state in file.of("states")}
-    fields |= {file.fields.value(v.name): v.value for v in file.calculated}
+    fields |= {file.fields.value(v.name): v.value for v in file.calculated_reals}
     fields |= events.indicators()
     fields |= {tick.field: tick.value for tick in ticks(file)}
     seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
@@ -251,14 +254,17 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
     started = {f"->{file.fields.value(v.name)} += ": v.initial.value for v in real}
     start_firsts = graph.derivatives(started.values(), seeds)
     start_seconds = graph.derivatives(start_firsts, seeds)
-    outputs = Code(leaves(file)).assign({f"to->{n}": v for n, v in fields.items()}).lines
+    outputs = Code(leaves(file)).assign({f"to->{n}": v for n, v in fields.items()})
+    for v in file.calculated_counts:
+        field = file.fields.count(v.name)
+        outputs.lines.append(f"to->{field} = {count(outputs, v.kind, v.value)};")
     first, second = rolled(curve.lines[:split], curve.lines[split:])
     is_long = len(first) + len(second) >= LONG
     return {
         "storage_of_propagate": "SELDOM_CALLED static" if is_long else "static",
         "started": _at_start(file, "d", dict(zip(started, start_firsts, strict=True))),
         "started_twice": _at_start(file, "dd", dict(zip(started, start_seconds, strict=True))),
-        "outputs": rolled(outputs)[0],
+        "outputs": rolled(outputs.lines)[0],
         "derivatives": first,
         "second_derivatives": second,
     }
@@ -275,11 +281,26 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value])
     return [f"if ({condition}) {{", *indented(code.lines), "}"]
 
 
+def _message(file: ModelFile, code: Code, given: str) -> str:
+    """Format and arguments of a message, in which values stand in the place of {NAME}."""
+    parts = re.split(r"\{(\w+(?:\[[0-9,]+\])?)\}", given)
+    form, arguments = parts[0].replace("%", "%%"), ""
+    for name, rest in zip(parts[1::2], parts[2::2], strict=True):
+        variable, shown = file.variables.get(name), f"{{{name}}}"
+        value = variable and (variable.leaf or variable.value)
+        if value and {op for op, _ in value.leaves} <= {"parameter", "integer"}:
+            shown = "%g" if variable.is_real else "%d"
+            found = code.of(value) if variable.is_real else f"(int){code.of(value)}"
+            arguments += f", {found} + 0.0" if variable.is_real else f", {found}"
+        form += shown + rest.replace("%", "%%")
+    return text(form) + arguments
+
+
 def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
-    conditions: list[tuple[str, str, list[Variable]]] = [
-        (f"isfinite(values->{file.fields.value(v.name)})", f"{base} is not finite", [])
+    conditions = [
+        (f"isfinite(values->{file.fields.value(v.name)})", text(f"{base} is not finite"))
         for v in file.of("parameters")
         for base in v.name.split("[")[:1]
     ]
@@ -287,14 +308,10 @@ def _checks(file: ModelFile) -> list[str]:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
-        read = [v for v in file.of("parameters") if (v.leaf.op, v.name) in check.value.leaves]
-        conditions.append((code.of(holds), message, read[:MOST_SHOWN]))
+        conditions.append((code.of(holds), _message(file, code, message)))
     lines = []
-    for condition, message, read in conditions:
-        shown = ", ".join(f"{v.name} = %g" for v in read)
-        values = "".join(f", values->{file.fields.value(v.name)}" for v in read)
-        given = f'"%s{shown and f" ({shown})"}", {text(message)}{values}'
-        why = f"    (void)snprintf(text, size, {given});"
+    for condition, message in conditions:
+        why = f"    (void)snprintf(text, size, {message});"
         refused = [f"if (!{condition}) {{", why, "    return STATUS_INVALID_PARAMETERS;", "}"]
         lines.append("\n".join(refused))
     return rolled(code.lines + lines)[0]

@@ -48,7 +48,7 @@ def solver_names() -> list[str]:
 def keys(file: ModelFile) -> list[Key]:
     """Return name and kind of each variable, in the order in which they get value references."""
     return [
-        *((variable.name, CAUSALITIES[variable.section]) for variable in file.variables.values()),
+        *((v.name, CAUSALITIES[v.section]) for v in file.variables.values() if v.shown),
         *((f"der_{state.name}", "local") for state in _without_derivative(file)),
         *((mode, "mode") for mode in file.modes),
         *((name, "local") for name in _indicators(file)),
@@ -117,7 +117,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "values": c_model.STRUCTURE,
         "symbol": c_model.SYMBOL,
         "event_indicators": [*indicators],
-        "naming": "structured" if any(file.dimensions.values()) else "flat",
+        "naming": "structured" if any("[" in name for name, _ in keys(file)) else "flat",
         "flat": flat(file),
         "modulated": modulated(file),
         "time_events": len(indicators) < len(relations) or bool(file.sampled),
@@ -144,8 +144,10 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
 
 def flat(file: ModelFile) -> list[str]:
     """Return functions without slope of what moves or is set, with the variables that call them."""
-    called = [(v.name, v.expression) for v in file.of("states", "where", "outputs")]
-    called += [pair for change in file.changes for pair in change.given.items()]
+    called = [(v.name, v.expression) for v in file.of("states", "where", "outputs") if v.is_real]
+    hidden = {variable.name for variable in file.variables.values() if not variable.shown}
+    changes = [pair for change in file.changes for pair in change.given.items()]
+    called += [(name, expression) for name, expression in changes if name not in hidden]
     found = {}
     for name, expression in called:
         nodes = in_order([expression.tree])
@@ -202,6 +204,8 @@ def _entries_of(
     if not variable.is_real:
         return _entries_of_count(variable, file)
     entries = _local(file.fields.value(variable.name)) | {"causality": causality}
+    if variable.section in ("where", "outputs") and variable.variability:
+        entries["variability"] = variable.variability
     if causality == "parameter":
         is_fixed = ("parameter", variable.name) in _fixed(file)
         entries["variability"] = "fixed" if is_fixed else "tunable"
@@ -235,9 +239,11 @@ def _entries_of(
 
 def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
     """Table of a condition, a whole number or an enumeration."""
-    kind, is_parameter = variable.kind, variable.section == OPTIONS
-    leaf: Leaf = (variable.leaf.op, variable.name)
-    variability = "discrete" if not is_parameter else "fixed" if leaf in _fixed(file) else "tunable"
+    kind, is_calculated = variable.kind, variable.leaf is None
+    leaf: Leaf = ("" if is_calculated else variable.leaf.op, variable.name)
+    variability = "discrete"
+    if variable.section == OPTIONS:
+        variability = "fixed" if leaf in _fixed(file) else "tunable"
     entries: dict[str, object] = {
         "field": file.fields.count(variable.name),
         "type": TYPES.get(kind, "enumeration") if isinstance(kind, str) else "enumeration",
@@ -245,10 +251,12 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
         "variability": variability,
     }
     if isinstance(kind, tuple):
-        entries["items"] = {item: {"description": item} for item in kind}
+        entries["items"] = {item: {"description": kind.descriptions[item]} for item in kind}
     bounds = {"min": variable.min, "max": variable.max}
     entries |= {key: number for key, number in bounds.items() if number is not None}
-    if variable.section == COUNTS:
+    if is_calculated:
+        entries |= _dependencies(variable.value, file)
+    elif variable.section == COUNTS:
         entries |= _known_of(_reached({leaf}, file, ["discrete"]), file)
         entries |= _initially({leaf}, {}, file)
     else:
@@ -258,8 +266,9 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
 
 
 def _fixed(file: ModelFile) -> frozenset[Leaf]:
-    """Leaves that periods follow from, which must not change."""
-    return frozenset().union(*(e.value.leaves for s in file.sampled for e in s.periods))
+    """Leaves of parameters that must not change: the file says so, or periods follow from them."""
+    said = {(v.leaf.op, v.name) for v in file.of("parameters", OPTIONS) if v.variability}
+    return frozenset(said).union(*(e.value.leaves for s in file.sampled for e in s.periods))
 
 
 def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str = "") -> str:
@@ -291,7 +300,8 @@ def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, list[str]]:
 
 
 def _in_order(names: set[str], file: ModelFile) -> list[str]:
-    return sorted(names & file.places.keys(), key=file.places.__getitem__)
+    hidden = {variable.name for variable in file.variables.values() if not variable.shown}
+    return sorted((names & file.places.keys()) - hidden, key=file.places.__getitem__)
 
 
 def _is_in(file: ModelFile, name: str, *sections: str) -> bool:

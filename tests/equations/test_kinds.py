@@ -1,0 +1,217 @@
+"""Outputs and [where] that are no real numbers; random numbers, which whole numbers choose."""
+
+import math
+from collections.abc import Iterator
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from rparm import api
+from tests.equations.compiled import declared, read
+from tests.equations.examples import METHODS, MODELS, initializing, loaded, made, simulated
+from tests.support.instances import Instance
+
+TEXTS = MODELS["kinds"]
+DELAY, EITHER, GEAR, NOISE = (TEXTS[name] for name in ("DELAY", "EITHER", "GEAR", "NOISE"))
+STATE = """name = "Checked"
+[parameters]
+p = { start = 1.0 }
+n = { type = "Integer", start = 2 }
+[states]
+x = { derivative = "-x" }
+"""
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("version", ["", "fmi3"])
+@pytest.mark.parametrize("fmi_type", ["CoSimulation", "ModelExchange"])
+def test_they_follow_the_motion(version: str, method: int, fmi_type: str) -> None:
+    fmu = made(GEAR)
+    run = simulated(
+        fmu.parent / version / fmu.name, 10.0, 0.01, {"solver_method": method, "large": 0.5},
+        fmi_type=fmi_type, relative_tolerance=1e-10, also=["hot", "warm", "level"],
+    )  # fmt: skip
+    # by the exact motion, except within a tolerance of the switches
+    w = np.sqrt(0.1)
+    x, v = 1.5 / w * np.sin(w * run["time"]), 1.5 * np.cos(w * run["time"])
+    sure = np.min(np.abs([x - 3, x - 1.5, v]), axis=0) > 1e-5
+    hot, warm = x > 3, (x > 1.5) & (x <= 3)
+    level = np.where(hot, 3, np.where(warm, 2, 1))
+    expected = {
+        "hot": hot, "warm": warm, "is_warm": warm, "level": level, "state": np.minimum(level, 2),
+        "gear": np.where(hot, np.where(v > 0, 1, -1), 2),
+    }  # fmt: skip
+    assert np.sum(sure) > 900
+    for name, values in expected.items():
+        assert np.array_equal(run[name][sure], values[sure]), name
+    assert {*run["count"]} == {5 * 10**8} and {*run["more"]} == {10**9}
+
+
+def test_what_they_follow_from_is_declared() -> None:
+    fmu = made(GEAR)
+    variables = declared(read(fmu.with_suffix(".toml")))["variables"]
+    kinds = {name: (v.get("type"), v["causality"]) for name, v in variables.items()}
+    assert kinds["gear"] == ("int32", "output") and kinds["hot"] == ("boolean", "local")
+    assert kinds["level"] == ("enumeration", "local") and kinds["height"] == (None, "output")
+    assert variables["gear"]["dependencies"] == ["x", "v"]
+    assert variables["gear"]["parameters"] == ["limit"]
+    assert variables["more"]["parameters"] == ["large"] and not variables["more"]["dependencies"]
+    assert [*variables["state"]["items"]] == ["low", "high"]
+    own = {v.name: v for v in fmpy.read_model_description(fmu).modelVariables}
+    assert (own["gear"].min, own["gear"].max, own["gear"].variability) == ("-1", "2", "discrete")
+    assert own["warm"].description == "Between half and all of the limit"
+
+
+def test_a_whole_number_of_more_than_32_bits_is_named() -> None:
+    with Instance(loaded(made(GEAR)), logging_on=True) as unit:
+        unit.initialize()
+        more = [unit.loaded.references["more"]]
+        with pytest.raises(FMICallException, match="discard"):
+            unit.fmi.getInteger(more)
+        said = (
+            "more: count + floor(1e9 * large) [floor: up to 2^30] is no number of 32 bits at t = 0"
+        )
+        assert unit.messages[-1].text == f"{said} with count = 1500000000, large = 1.5"
+        unit.set(large=1.0)
+        assert unit.fmi.getInteger(more) == [2 * 10**9]
+
+
+# ---- Random numbers ------------------------------------------------------------------------------
+
+
+def words(seed: int, stream: int, times: int) -> Iterator[int]:
+    """Words of 53 bits of SplitMix64, whose start is finalized so often."""
+
+    def finalized(z: int) -> int:
+        z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
+        z = (z ^ (z >> 27)) * 0x94D049BB133111EB % 2**64
+        return z ^ (z >> 31)
+
+    state = (seed % 2**32 << 32) + stream
+    for _ in range(times):
+        state = finalized(state)
+    while True:
+        state = (state + 0x9E3779B97F4A7C15) % 2**64
+        yield finalized(state) >> 11
+
+
+def normal(seed: int, stream: int, count: int) -> list[float]:
+    found = words(seed, stream, 1)
+    pairs = [((next(found) + 1) / 2**53, next(found) / 2**53) for _ in range(count)]
+    return [math.sqrt(-2 * math.log(a)) * math.cos(2 * math.pi * b) for a, b in pairs]
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_random_numbers_follow_from_seed_and_number(method: int) -> None:
+    """They push a state, piece by piece, and disturb its samples; names may be like functions."""
+    run = simulated(made(NOISE), 4.0, 0.05, {"seed": -3, "solver_method": method}, also=["gust"])
+    t, gusts = run["time"], np.array([2.0 * z for z in normal(-3, 2, 40)])
+    x = np.concatenate([[0.0], np.cumsum(gusts) / 8])
+    piece = np.minimum(np.floor(t * 8 + 1e-9), 31).astype(int)
+    assert np.max(np.abs(run["x"] - x[piece] - gusts[piece] * (t - piece / 8))) < 1e-7
+    tick = np.floor(t * 10 + 1e-6).astype(int)
+    assert np.array_equal(run["k"], tick + 1)
+    uniform = words(-3, 0, 2)
+    assert np.array_equal(run["u"], np.array([next(uniform) / 2**53 for _ in range(50)])[tick])
+    at_tick = np.abs(t * 10 - tick) < 1e-6
+    added = 2.0 * np.array(normal(-3, 0, 50))[tick]
+    assert np.sum(at_tick) > 40
+    assert np.max(np.abs(run["y"] - run["x"] - added)[at_tick]) < 1e-12
+
+
+def test_a_function_of_the_file_is_meant_instead() -> None:
+    run = simulated(made(TEXTS["OWN_NOISE"]), 1.0, 0.5, {}, relative_tolerance=1e-10)
+    assert run["x"][-1] == pytest.approx(math.exp(2.0), rel=1e-8)
+
+
+def test_a_parameter_is_fixed_if_the_file_says_so() -> None:
+    variables = declared(read(made(NOISE).with_suffix(".toml")))["variables"]
+    fixed = {name for name, v in variables.items() if v.get("variability") == "fixed"}
+    assert fixed == {"seed", "sigma", "noise", "tau"}  # the last two by the sampler
+
+
+# ---- A law that is continuous or sampled ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("Ts", [0.0, 0.1])
+@pytest.mark.parametrize("version", ["", "fmi3"])
+@pytest.mark.parametrize("fmi_type", ["CoSimulation", "ModelExchange"])
+def test_a_sampler_of_period_0_never_ticks(fmi_type: str, version: str, Ts: float) -> None:
+    fmu = made(EITHER)
+    run = simulated(
+        fmu.parent / version / fmu.name, 2.0, 0.05, {"Ts": Ts}, fmi_type=fmi_type,
+        relative_tolerance=1e-10,
+    )  # fmt: skip
+    t, tick = run["time"], np.floor(run["time"] * 10 + 0.5 + 1e-9)
+    is_clear = np.abs(t * 10 + 0.5 - np.round(t * 10 + 0.5)) > 1e-6  # importers see both sides
+    assert np.array_equal(run["ticks"][is_clear], (tick if Ts else 0 * t)[is_clear])
+    at_tick = np.append(1.0, 0.6 ** np.arange(21.0))  # before the first one, x rests at 1
+    sampled = at_tick[tick.astype(int)] - 0.4 * (tick > 0) * at_tick[tick.astype(int)] * (
+        t * 10 + 0.5 - tick
+    )
+    assert np.max(np.abs(run["x"] - (sampled if Ts else np.exp(-4.0 * t)))) < 1e-8
+
+
+def test_a_linear_model_has_only_samplers_that_tick() -> None:
+    fmu = made(EITHER)
+    continuous, sampled = (api.linearize(fmu, at={"Ts": Ts}) for Ts in (0.0, 0.1))
+    assert continuous.states == ("x",) and sampled.states == ("x", "held")
+
+
+# ---- Arrays --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("delay", [0, 3, 4])
+def test_an_index_may_follow_from_variables(delay: int) -> None:
+    """A register whose start is that of an input, and the element that a parameter names."""
+    with initializing(made(DELAY)) as unit:
+        integers = [unit.loaded.references[name] for name in ("delay", "at")]
+        unit.fmi.setInteger(integers[:1], [delay])
+        unit.set(u=1.5)
+        assert unit.get("late", "twice") == [3.0, 6.0]
+        unit.fmi.exitInitializationMode()
+        is_open = [unit.loaded.references["is_open"]]
+        given = [1.5 - k for k in range(12)]
+        x = 0.0
+        for k, u in enumerate(given):
+            unit.set(u=u)
+            t, late = k * 0.1, unit.get("late")[0]
+            unit.step(t, 0.1)
+            shown = given[k - delay] if k >= delay else 3.0
+            place = (k + 1) % 3
+            assert unit.get("late", "twice") == [shown, 2 * shown]
+            assert unit.fmi.getInteger(integers[1:]) == [place + 1]
+            assert unit.fmi.getBoolean(is_open) == [place != 1]
+            assert unit.get("column") == [[0.0, 21.0, 22.0][place]]
+            x -= 0.5 * (late + shown)
+            assert unit.get("x")[0] == pytest.approx(x, abs=1e-8)
+
+
+def test_an_index_out_of_range_is_named() -> None:
+    with Instance(loaded(made(DELAY)), logging_on=True) as unit:
+        unit.fmi.setInteger([unit.loaded.references["delay"]], [5])
+        unit.initialize()
+        with pytest.raises(FMICallException, match="discard"):
+            unit.get("late")
+        said = "late: d[delay] [index of d: 0..4] is not finite at t = 0 with delay = 5"
+        assert unit.messages[-1].text == said
+
+
+def test_what_is_not_shown_is_no_variable() -> None:
+    fmu = made(DELAY)
+    variables = {v.name: v for v in fmpy.read_model_description(fmu).modelVariables}
+    assert not [name for name in variables if name.startswith(("d[", "hidden", "sampled_"))]
+    kinds = {name: variables[name].variability for name in ("late", "twice", "e[1,2]")}
+    assert kinds == {"late": "discrete", "twice": "continuous", "e[1,2]": "discrete"}
+
+
+def test_a_check_shows_values() -> None:
+    text = STATE + '[check]\n"100 % of {p} and {n}, not {q}" = "p < n"\n'
+    with Instance(loaded(made(text)), logging_on=True) as unit:
+        unit.begin(p=2.5)
+        with pytest.raises(FMICallException, match="error"):
+            unit.fmi.exitInitializationMode()
+        # to loggers a message is a format
+        assert unit.messages[-1].text == "100 %% of 2.5 and 2, not {q}"
