@@ -235,7 +235,11 @@ def prover_of(path: Path) -> Prover:
             raise UserError(f"{path}: {expected}, got {subject.name}")
         file = folder / Path(names[0]).name
         file.write_bytes(archive.read(names[0]))
-        return Prover(_motion(file))
+        try:
+            return Prover(_motion(file))
+        except UserError as error:  # C or tables are files beside it
+            way_out = f"the key fmu may name the file with equations instead of {subject.name}"
+            raise UserError(f"{path}: {way_out}: {error}") from error
 
 
 def of_folder(folder: Path) -> Prover:

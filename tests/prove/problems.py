@@ -25,7 +25,7 @@ from compiler.write.motion import motion  # noqa: E402
 SOURCES = ROOT / "rparm" / "proof"
 COMPILE = ("cc", "-std=c17", "-O1", "-ffp-contract=off", "-w")
 EXAMPLES = ROOT / "examples" / "models"
-ARM = ROOT / "tests" / "equations" / "arm.toml"
+ARM = ROOT / "models" / "rp_manipulator" / "rp_manipulator.toml"
 
 
 @cache
