@@ -4,10 +4,13 @@
 
 #include "series.h"
 
+#include <string.h>
+
 #define SMALL     0x1p-100 /* a coefficient that ends the polynomial, */
 #define ACCURATE  0x1p-98  /* a remainder that is small enough: in units of the state, */
 #define ROUNDED   0x1p-6  /* or of this share of the state: roundings of its value are no smaller */
 #define SHARE     0x1p-20 /* or a remainder that is a small part of the hull's radius */
+#define CLEARLY   1.25    /* by which a set is smaller along sides that have no right angles */
 #define ROOM      0x1p-8  /* by which a box is larger than what was estimated */
 #define CONFIRMED 0x1p-12 /* room that is left after the check, for another arithmetic */
 #define LOOSENED  0x1p-7  /* enlarges derivatives, for the same reason, */
@@ -78,7 +81,7 @@ static void set_hull(const struct states_set *set, int n, struct ball hull[]) {
     }
 }
 
-/* ---- Frames: matrices, orthogonal but for rounding, of columns frame[0] .. [n - 1] ---------- */
+/* ---- Frames: matrices of columns frame[0] .. [n - 1] ---------------------------------------- */
 
 typedef double vectors_of[MOST_STATES][MOST_STATES];
 
@@ -131,27 +134,64 @@ static void frame_along(struct ball sides[][MOST_STATES], const double radius[],
     }
 }
 
+/* An approximate inverse, by Gauss and Jordan; without one, infinite numbers. */
+static void invert(vectors_of matrix, int n, vectors_of inverse) {
+    vectors_of left;
+    for (int j = 0; j < n; j++) {
+        for (int i = 0; i < n; i++) {
+            left[j][i] = matrix[j][i];
+            inverse[j][i] = i == j ? 1.0 : 0.0;
+        }
+    }
+    for (int k = 0; k < n; k++) { // of both, columns are combined
+        int pivot = k;
+        for (int j = k + 1; j < n; j++) {
+            pivot = fabs(left[j][k]) > fabs(left[pivot][k]) ? j : pivot;
+        }
+        const double divisor = left[pivot][k];
+        for (int i = 0; i < n; i++) {
+            const double x = left[pivot][i], y = inverse[pivot][i];
+            left[pivot][i] = left[k][i];
+            inverse[pivot][i] = inverse[k][i];
+            left[k][i] = x / divisor;
+            inverse[k][i] = y / divisor;
+        }
+        for (int j = 0; j < n; j++) {
+            const double factor = j == k ? 0.0 : left[j][k];
+            for (int i = 0; i < n; i++) {
+                left[j][i] -= factor * left[k][i];
+                inverse[j][i] -= factor * inverse[k][i];
+            }
+        }
+    }
+}
+
 /* Bounds of |Q^-1 (sum of c_j side_j + z)| over all |c_j| <= radius_j and |z_i| <= rest_i, which
- * README.md derives. */
-static void coordinates_in(vectors_of frame, struct ball sides[][MOST_STATES],
-                           const double radius[], const double rest[], int n,
-                           double coordinates[]) {
-    double outward = OUTWARD; // for every 16 terms: each adds a rounding
+ * README.md derives. Returns how large the set in these coordinates is, over what is small. */
+static double coordinates_in(vectors_of frame, struct ball sides[][MOST_STATES],
+                             const double radius[], const double rest[], const double small[],
+                             int n, double coordinates[]) {
+    static vectors_of inverse; // too large for the stack of every system
+    double outward = OUTWARD;  // for every 16 terms: each adds a rounding
     for (int i = 0; i < n; i += 8) {
         outward *= OUTWARD;
     }
+    invert(frame, n, inverse);
     double deviation = 0.0, all = 0.0;
     for (int i = 0; i < n; i++) {
-        struct ball axis[MOST_STATES];
+        double across[MOST_STATES], sum = 0.0, row = 0.0; // a row of the inverse
         for (int j = 0; j < n; j++) {
-            axis[j] = ball_exact(frame[i][j]);
+            across[j] = inverse[j][i];
         }
-        double sum = 0.0, row = 0.0;
         for (int j = 0; j < n; j++) {
-            const struct ball product = ball_dot(frame[j], axis, n);
+            struct ball column[MOST_STATES];
+            for (int k = 0; k < n; k++) {
+                column[k] = ball_exact(frame[j][k]);
+            }
+            const struct ball product = ball_dot(across, column, n);
             row += ball_largest(ball_difference(ball_exact(i == j ? 1.0 : 0.0), product));
-            sum += ball_largest(ball_dot(frame[i], sides[j], n)) * radius[j];
-            sum += fabs(frame[i][j]) * rest[j];
+            sum += ball_largest(ball_dot(across, sides[j], n)) * radius[j];
+            sum += fabs(across[j]) * rest[j];
         }
         deviation = fmax(deviation, row * outward);
         coordinates[i] = (sum + TINY) * outward;
@@ -159,9 +199,18 @@ static void coordinates_in(vectors_of frame, struct ball sides[][MOST_STATES],
     }
     const double below_one = (1.0 - deviation) * INWARD;
     const double share = below_one > 0.0 ? deviation / below_one * OUTWARD : (double)INFINITY;
+    double largest = 0.0;
     for (int i = 0; i < n; i++) {
         coordinates[i] = (coordinates[i] + share * all * outward) * OUTWARD;
     }
+    for (int i = 0; i < n; i++) {
+        double reach = 0.0;
+        for (int j = 0; j < n; j++) {
+            reach += fabs(frame[j][i]) * coordinates[j];
+        }
+        largest = reach / small[i] < largest ? largest : reach / small[i]; // also: no number
+    }
+    return largest;
 }
 
 /* ---- Series and box ------------------------------------------------------------------------- */
@@ -287,15 +336,19 @@ static bool move_set(const struct states_set *before, struct step *step, int n) 
     struct states_set *after = &step->after;
     double rest[MOST_STATES];
     static struct ball axes[MOST_STATES][MOST_STATES]; // too large for the stack of every system
+    static vectors_of moved_sides;
+    double small[MOST_STATES], moved_radii[MOST_STATES];
     *after = (struct states_set){.sides = before->sides};
     for (int i = 0; i < n; i++) {
         const struct ball end = ball_sum(step->endpoint[i], step->remainder[i]);
         after->centre[i] = ball_midpoint(end);
+        small[i] = small_for(end, 1.0);
         rest[i] = end.radius;
         for (int j = 0; j < before->sides; j++) {
             const struct ball moved = ball_dot(before->side[j], step->jacobian[i], n);
             if (j < n) {
                 axes[j][i] = moved;
+                moved_sides[j][i] = moved.hi;
                 continue;
             }
             after->side[j][i] = moved.hi;
@@ -305,8 +358,16 @@ static bool move_set(const struct states_set *before, struct step *step, int n) 
         }
         rest[i] = (rest[i] + TINY) * OUTWARD;
     }
+    // the sides as they are, or right angles: in which of both the set is smaller
+    const double as_they_are =
+        coordinates_in(moved_sides, axes, before->radius, rest, small, n, moved_radii);
     frame_along(axes, before->radius, n, after->side);
-    coordinates_in(after->side, axes, before->radius, rest, n, after->radius);
+    const double at_right_angles =
+        coordinates_in(after->side, axes, before->radius, rest, small, n, after->radius);
+    if (CLEARLY * as_they_are < at_right_angles) {
+        memcpy(after->side, moved_sides, (size_t)n * sizeof(after->side[0]));
+        memcpy(after->radius, moved_radii, (size_t)n * sizeof(double)); // others stay
+    }
     bool finite = true;
     for (int i = 0; i < n; i++) {
         finite = finite && ball_largest(after->centre[i]) + after->radius[i] <= DBL_MAX;
