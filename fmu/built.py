@@ -1,7 +1,7 @@
 """Packs all that is built for each platform but the FMUs, for an installed package: built.tar.xz.
 
 PLATFORM.json        runtime.json of the platform (runtime.cmake), with paths that begin here
-PLATFORM/            the objects and libraries it names, and programs: proof/MODEL/prove
+PLATFORM/            the objects and libraries it names, and the program proof/prove
 project/, musl/ ...  the sources it names, the same for all, and all that these include
 playground/          the page for a browser
 """
@@ -45,7 +45,7 @@ def collect(build: Path) -> dict[str, bytes]:
         sources.add_header(header, libraries[-1])
     objects = [path for version in versions for path in version["objects"]]
     files = [*sources.origins.values(), *objects, *content["libraries"]]
-    files += [*content["licenses"].values(), *build.glob("proof/*/prove*")]
+    files += [*content["licenses"].values(), *filter(Path.is_file, build.glob("proof/*"))]
     content["compiler"][0] = Path(content["compiler"][0]).stem
     content["options"] = [o for o in content["options"] if not o.startswith("-ffile-prefix-map")]
     relative = re.sub(
@@ -63,7 +63,7 @@ def packed(files: Iterable[tuple[str, bytes]]) -> bytes:
         for name, content in sorted(files):
             info = tarfile.TarInfo(name)
             info.size = len(content)
-            info.mode = 0o755 if "/proof/" in name else 0o644
+            info.mode = 0o755 if "/proof/prove" in name else 0o644
             target.addfile(info, io.BytesIO(content))
     return lzma.compress(archive.getvalue(), preset=9 | lzma.PRESET_EXTREME)
 

@@ -15,13 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rparm import files, project, proof
+from rparm import files, project
 from rparm.building import build as build
 from rparm.errors import UserError, hint, placed
 from rparm.federation import federation, network
 from rparm.files import written
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
+from rparm.proof import errors as proof
+from rparm.proof.enclosure import prover_of
 from rparm.runs import scenario as scenarios
 from rparm.runs import simulation
 from rparm.runs.comparison import load_reference
@@ -279,11 +281,11 @@ class Scenario:
         dict of str to float
             Largest distance at communication points, by the name of the state, in its unit.
         """
-        program = proof.prover_of(self.path)
+        program = prover_of(self.path)
         with self._opened(2) as (opened, loaded):
             enclosure = program.enclose(loaded).of(program.states)
             if enclosure.stopped is not None:
-                raise UserError(f"{self.path}: the proof holds up to {enclosure.stopped!r} s only")
+                raise UserError(f"{self.path}: {enclosure.stopped}")
             used = method or opened.model.method(loaded.parameters)
             (used,) = proof.methods_of(opened, used)
             found = proof.error_bounds(

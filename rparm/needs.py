@@ -63,7 +63,7 @@ COMMANDS = {
         "step one component in a federation of another machine",
         "federation", "federation", "federation", target="",
     ),
-    "prove": Command("bound the errors of runs and references by theorem", "prove"),
+    "prove": Command("bound the errors of runs and references by theorem", "prove", builds=True),
     "playground": Command(
         "say where the page with the plant is, for a browser",
         "files", lock="release", target="playground",

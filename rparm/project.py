@@ -12,8 +12,8 @@ models/MODEL/start.toml                 values that a new scenario of the model 
 models/SYSTEM/system.svg                its components and the signals between them
 models/*/animation.py                   what of a run the report animates
 models/SYSTEM/identification.py         makes a log of the system, to identify parameters from
-models/MODEL/proof/proof.toml           what the program that encloses motions reads and gives
-build/proof/MODEL/prove                 that program
+build/proof/prove                       encloses motions; MODEL.json beside it are those of models
+fmu/equations_to_motion.py              writes such a file, in a separate process
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
@@ -53,7 +53,6 @@ STUDY = "study"  # the module of a system's folder that rparm.systems.comparison
 IDENTIFICATION = "identification"  # module of a system's folder, read by identification.request
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
 WEB = "wasm32-wasi"  # platform of FMUs for browsers
-PROOF = "proof"  # folder of a model with the program that encloses its motions
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 VERSIONS = tuple(BUILD_FOLDERS)
@@ -271,15 +270,19 @@ def fmu_of(subject: Path, option: str = "", version: str = VERSIONS[0]) -> Path:
     return built(subject, ".fmu", option, version) if subject.is_dir() else subject
 
 
-def proof_file(folder: Path) -> Path:
-    """Return the file that describes the program that encloses motions of a model."""
-    return folder / PROOF / f"{PROOF}.toml"
+def proof_folder() -> Path:
+    """Return the folder of the program that encloses motions, and of the models' motions."""
+    return (built_for_all() / platform_name() if INSTALLED else ROOT / "build") / "proof"
 
 
-def proof_program(folder: Path) -> Path:
+def motion_file(name: str) -> Path:
+    """Return the file with the motion of a model, which only models of equations have."""
+    return proof_folder() / f"{name}.json"
+
+
+def proof_program() -> Path:
     """Return the program that encloses motions; UserError if it is not there."""
-    build = built_for_all() / platform_name() if INSTALLED else ROOT / "build"
-    program = build / PROOF / folder.name / "prove"
+    program = proof_folder() / "prove"
     program = program.with_suffix(".exe") if os.name == "nt" else program
     if not os.access(program, os.X_OK):
         way_out = "RPARM_CACHE names another folder" if INSTALLED else f"{PROGRAM} builds it"
@@ -313,6 +316,11 @@ def page(name: str) -> Path:
 def model_builder() -> Path:
     """Return the path of the program that makes FMUs of own equations."""
     return Path(fmu_tools.__path__[0]) / "equations_to_fmu.py"
+
+
+def motion_reader() -> Path:
+    """Return the path of the program that writes the motion of a file with equations."""
+    return model_builder().with_name("equations_to_motion.py")
 
 
 def runtimes(all_platforms: bool, web: bool = False) -> list[Path]:

@@ -1,18 +1,24 @@
 """`prove`: how far runs and references are from the exact motion at most, by theorem."""
 
 import argparse
-from collections.abc import Collection, Mapping
-from dataclasses import asdict
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 
-from rparm import console, project, proof
+from rparm import building, console, project
 from rparm.command_line import Ended, add_flag, add_report, add_tolerance, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, WrongValueError, counted, placed
 from rparm.files import check_writable, written
 from rparm.fmi.fmu_file import Fmu
-from rparm.proof import ASSUMED, Enclosure, ProvenReference, Prover
+from rparm.interruption import temporary_folder
+from rparm.proof import enclosure as enclosures
+from rparm.proof import errors as proof
+from rparm.proof.enclosure import ASSUMED, Enclosure, Prover
+from rparm.proof.errors import ProvenReference
 from rparm.report import proof_page
 from rparm.runs import scenario as scenarios
 from rparm.runs.scenario import Scenario
@@ -25,12 +31,12 @@ def add_prove_options(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Encloses the exact motion of a scenario in intervals, by validated integration, and "
         "prints how far the states in a run of the FMU are from it at most, for each method of "
-        "integration. Every value of the scenario's reference must be the double nearest to "
-        f"the exact one. Without a scenario, checks all references. Assumed are {ASSUMED}."
+        "integration, up to the first event. A model of equations runs as its file says. Every "
+        "value of a scenario's reference must be the double nearest to the exact one. Without a "
+        f"scenario, checks all references. Assumed are {ASSUMED}."
     )
-    parser.add_argument(
-        "name", nargs="?", metavar="SCENARIO", help="a scenario, or a file FILE.toml of your own"
-    )
+    text = "a scenario, or a file FILE.toml of your own: a scenario or a model of equations"
+    parser.add_argument("name", nargs="?", metavar="SCENARIO", help=text)
     add_flag(parser, "--all", "all references, as without a scenario")
     parser.add_argument("--method", metavar="NAME", help="only this method of integration")
     add_tolerance(parser, "relative tolerance of the runs (default: that of the scenario)")
@@ -52,15 +58,14 @@ def do_prove(options: argparse.Namespace) -> Ended:
         raise UserError(f"--all: expected no scenario with it, got {options.name!r}")
     check_writable(options.report)
     path = project.scenario_file(options.name)
-    program = proof.prover_of(path)
-    with Fmu(project.built(program.folder, ".fmu")) as fmu:
-        scenario = scenarios.load(path, fmu.model)
+    program = enclosures.prover_of(path)
+    with _opened(path) as (fmu, scenario):
         methods = proof.methods_of(fmu, options.method)
         within = _within(options.within, program, fmu)
         enclosure = _enclosure(program, scenario, within)
-        if enclosure.stopped is not None:
-            text = f"failed: the proof holds up to {enclosure.stopped!r} s, no further"
-            return Ended(1, text, {"holds_up_to": enclosure.stopped})
+        stopped = enclosure.stopped
+        if stopped and not stopped.is_event:
+            return Ended(1, f"failed: {stopped}", {"holds_up_to": stopped.time})
         good = None
         if path.resolve() in {file.resolve() for file in project.scenario_files().values()}:
             exact = _enclosure(program, scenario, {}) if within else enclosure
@@ -73,18 +78,38 @@ def do_prove(options: argparse.Namespace) -> Ended:
             )
     checked = _checked(program, {scenario: enclosure}) if options.check else {}
     largest = max(e.error for errors in found.values() for e in errors.values())
+    verdict = f"largest proven error: {rounded_up(largest, 2)}"
     methods = {m: {n: asdict(e) for n, e in errors.items()} for m, errors in found.items()}
     document = {"methods": methods} | ({"reference": asdict(good)} if good else {})
     document |= {"page": page.absolute()} | checked
+    if stopped:
+        document |= {"holds_up_to": stopped.time, "event": stopped.reason}
+        verdict = f"{verdict}; {stopped}"
     if good and not good.passed:
         return Ended(1, _verdict([good]), document, page=page)
-    return Ended(0, f"largest proven error: {rounded_up(largest, 2)}", document, page=page)
+    return Ended(0, verdict, document, page=page)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[Fmu, Scenario]]:
+    """Open the FMU of a scenario; of a file with equations, with what its `experiment` says."""
+    if not building.is_equations(path):
+        with Fmu(project.fmu_of(scenarios.subject_of(path))) as fmu:
+            yield fmu, scenarios.load(path, fmu.model)
+        return
+    with Fmu(path) as fmu, temporary_folder() as folder:
+        file = folder / path.name
+        text = scenarios.template(path.stem, scenarios.FMU, str(path.absolute()), fmu.model)
+        file.write_text(text, encoding="utf-8")
+        scenario = scenarios.load(file, fmu.model)
+        text = "As the model's file says, with inputs at their starts."
+        yield fmu, replace(scenario, path=path, title=fmu.model.name, description=text)
 
 
 def _reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenReference:
     """Check a scenario's reference; print its wrong values."""
     if enclosure.stopped is not None:
-        raise UserError(f"{scenario.path}: proven up to {enclosure.stopped} s only")
+        raise UserError(f"{scenario.path}: {enclosure.stopped}")
     good = proof.proven_reference(fmu, scenario, enclosure)
     for wrong in good.wrong:
         print(wrong)
@@ -162,10 +187,11 @@ def _references(options: argparse.Namespace) -> Ended:
     check_writable(options.report)
     found: dict[str, ProvenReference] = {}
     everything, rows = {}, []
-    for program in proof.provers().values():
-        files = [x for x in project.scenario_files().values() if x.parents[1] == program.folder]
+    for name, program in enclosures.provers().items():
+        folder = project.model(name)
+        files = [x for x in project.scenario_files().values() if x.parents[1] == folder]
         table = console.Table("reference", [x.stem for x in files], COLUMNS)
-        with Fmu(project.built(program.folder, ".fmu")) as fmu:
+        with Fmu(project.built(folder, ".fmu")) as fmu:
             proofs = {}
             for scenario in [scenarios.load(path, fmu.model) for path in files]:
                 enclosure = proofs[scenario] = _enclosure(program, scenario, {})
@@ -192,11 +218,10 @@ def _references(options: argparse.Namespace) -> Ended:
 
 def _checked(program: Prover, proofs: Mapping[Scenario, Enclosure]) -> dict[str, dict[str, int]]:
     """Check the proofs of scenarios; prints how much is confirmed."""
-    steps = operations = 0
+    steps = 0
     for scenario, enclosure in proofs.items():
-        ahead = len(enclosure.starts) * (len(scenario.times) - 1)
+        ahead = len(enclosure.starts) * (len(enclosure.times) - 1)
         with Progress(f"{scenario.name}, check", ahead) as progress:
-            more, operations = program.check(scenario, enclosure, progress)
-        steps += more
-    print(f"checked: {steps} steps and {operations} operations confirmed")
-    return {"checked": {"steps": steps, "operations": operations}}
+            steps += program.check(scenario, enclosure, progress)
+    print(f"checked: {steps} steps confirmed")
+    return {"checked": {"steps": steps}}

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import proof
 from rparm.errors import counted
 from rparm.fmi.model import Model
-from rparm.proof import Enclosure, ProvenReference
+from rparm.proof.enclosure import ASSUMED, Enclosure
+from rparm.proof.errors import ProvenReference, largest_errors
 from rparm.report import charts, overview
 from rparm.report.charts import Chart
 from rparm.report.overview import FAILED, PASSED, PROOFS
@@ -17,7 +17,7 @@ from rparm.report.run_data import Curve, Plot, RunData, thinned
 from rparm.runs.scenario import Scenario
 from rparm.units import SMALLEST, number, rounded_up, unit
 
-ASSUMES = f"The proof assumes {proof.ASSUMED}."
+ASSUMES = f"The proof assumes {ASSUMED}."
 
 
 def write(
@@ -56,6 +56,8 @@ def write(
     ]
     if len(enclosure.starts) > 1:
         facts.append(("start", f"in {counted(enclosure.starts, 'piece')}"))
+    if enclosure.stopped:
+        facts.append(("proven up to", str(enclosure.stopped)))
     if good is not None:
         facts.append(("reference", f"{good.nearest} of {good.values} values are nearest doubles"))
     page = RunPage(
@@ -121,6 +123,6 @@ def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray
     heads = [f"{n} in {unit(model.variables[n].unit)}" for n in enclosure.names]
     rows = []
     for run, course in errors.items():
-        largest = proof.largest_errors(course, enclosure).values()
+        largest = largest_errors(course, enclosure).values()
         rows.append((run, *(f"{rounded_up(e.error, 2)} at {e.at:.4g} s" for e in largest)))
     return Table("Largest proven errors", ("run", *heads), rows)

@@ -9,7 +9,8 @@ import numpy as np
 
 from rparm import files
 from rparm.fmi.model import Model, Value, Variable
-from rparm.proof import ASSUMED, ProvenError, errors_of_run
+from rparm.proof.enclosure import ASSUMED
+from rparm.proof.errors import ProvenError, errors_of_run
 from rparm.report import motion, overlay, overview
 from rparm.report.overview import FAILED, PASSED, RAN, Entry
 from rparm.report.pages import RunPage, Table

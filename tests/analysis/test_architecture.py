@@ -39,7 +39,7 @@ MAY_INCLUDE = {
     r"fmu/component": ("src/instance", "src/model"),
     r"fmu/fmi\d": ("fmu/component", "src/instance", "src/model"),
     r"models": ("src/model",),
-    r"models/\w+/proof": (),
+    r"rparm/proof": (),
     r"models/\w+(/equations)?": ("models", "src/model"),
 }  # fmt: skip
 # the equations of another model
@@ -112,8 +112,11 @@ def folder_of(path: Path, root: Path) -> str:
     return path.parent.relative_to(root).as_posix()
 
 
+TOPS_OF_C = ("src", "fmu", "models", "rparm")
+
+
 def c_files(root: Path) -> list[Path]:
-    return sorted(path for top in ("src", "fmu", "models") for path in (root / top).rglob("*.[ch]"))
+    return sorted(path for top in TOPS_OF_C for path in (root / top).rglob("*.[ch]"))
 
 
 def find_header(name: str, source: Path, files: list[Path]) -> Path | None:

@@ -31,14 +31,15 @@ COMMANDS = {
         "rparm/commands/files.py", "rparm/systems/ecos.py",
         "models/*/animation.py", "models/*/study.py",
         "fmu/generate.py", "fmu/document.py", "fmu/references.py", "fmu/package.py",
-        "fmu/source_code.py", "fmu/equations_to_fmu.py", "fmu/equations_schema.py",
+        "fmu/source_code.py", "fmu/equations_to_fmu.py", "fmu/equations_to_motion.py",
+        "fmu/equations_schema.py",
     ),
     "campaign": (
         "rparm/commands/campaign.py", "rparm/campaign/*.py", "rparm/fmi/compiled_*.py",
     ),
     "control": (
         "rparm/commands/linearize.py", "rparm/linearization/*.py", "rparm/commands/identify.py",
-        "rparm/identification/*.py",
+        "rparm/identification/*.py", "rparm/proof/checker.py",
     ),
     "federation": ("rparm/commands/fed*.py", "rparm/federation/*.py"),
     "release": ("fmu/bill_of_materials.py", "fmu/built.py", "fmu/wheel.py", "playground/build.py"),
@@ -47,7 +48,7 @@ COMMANDS = {
 # what others use only where its packages are installed
 OPTIONAL = (
     "rparm/campaign/*.py", "rparm/federation/*.py", "rparm/identification/*.py",
-    "rparm/linearization/*.py", "rparm/fmi/compiled_*.py",
+    "rparm/linearization/*.py", "rparm/fmi/compiled_*.py", "rparm/proof/checker.py",
 )  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]

@@ -127,7 +127,6 @@ def sources(root: Path) -> dict[str, str]:
         path.relative_to(root).as_posix(): path.read_text(encoding="utf-8")
         for folder in FOLDERS
         for path in sorted((root / folder).rglob("*.[ch]"))
-        if path.parent.name != "proof"  # has its own faults: tests/prove
     }
 
 

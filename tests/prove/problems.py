@@ -1,125 +1,147 @@
-"""Problems for the program that encloses the arm's motion, and its answers."""
+"""Problems for the program that encloses motions, without FMUs, and what it answers."""
 
-import os
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+from flint import arb
 
+from rparm import project
+from rparm.proof import checker
+from rparm.proof.enclosure import Enclosure, Prover
+from rparm.proof.problem import Problem
 from tests.support.paths import ROOT
 
-BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
-PROGRAM = BUILD / "proof" / "rp_manipulator" / "prove"
-SOURCES = ROOT / "models" / "rp_manipulator" / "proof"
+sys.path.insert(0, str(ROOT / "fmu"))
+from compiler.read.model_file import read  # noqa: E402
+from compiler.write.motion import motion  # noqa: E402
+
+SOURCES = ROOT / "rparm" / "proof"
 COMPILE = ("cc", "-std=c17", "-O1", "-ffp-contract=off", "-w")
-sys.path.insert(0, str(SOURCES))
-import check as check  # noqa: E402
-import check_operations as check_operations  # noqa: E402
-import motion_series as motion_series  # noqa: E402
-import operands as operands  # noqa: E402
-
-PARAMETERS = (2.0, 1.0, 0.1, 0.05, 0.5, 0.25, 0.1, 9.81)  # m1 m2 I1z I2z l1 lc1 a g
-Cubic = Sequence[float]  # value and derivatives, at the begin of a communication step
+EXAMPLES = ROOT / "examples" / "models"
+ARM = ROOT / "models" / "rp_manipulator" / "rp_manipulator.toml"
 
 
-@dataclass(frozen=True)
-class Problem:
-    """What is asked of the program.
-
-    Attributes
-    ----------
-    radii, parameter_radii : sequences of 4 and 8 floats
-        Of the start's states and of the parameters.
-    sines : tuple
-        Effort (0 or 1), amplitude, frequency in Hz, phase in rad.
-    steps : tuple
-        End of each communication step in s, cubics of tau1 and f2 over it.
-    """
-
-    states: Sequence[float]
-    steps: Sequence[tuple[float, Cubic, Cubic]]
-    parameters: Sequence[float] = PARAMETERS
-    radii: Sequence[float] = (0.0,) * 4
-    parameter_radii: Sequence[float] = (0.0,) * 8
-    sines: Sequence[tuple[int, float, float, float]] = field(default=())
-    start: float = 0.0
-
-    @property
-    def text(self) -> str:
-        """As the program reads it."""
-        lines = [
-            _line("start", [self.start]),
-            _line("states", _balls(self.states, self.radii)),
-            _line("parameters", _balls(self.parameters, self.parameter_radii)),
-            *(_line("sine", sine) for sine in self.sines),
-            *(_line("to", [end, *_four(tau1), *_four(f2)]) for end, tau1, f2 in self.steps),
-        ]
-        return "".join(lines)
+@cache
+def model(given: str | Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The motion of a file, or of a text, and the start values that it gives."""
+    with TemporaryDirectory() as folder:
+        path = given if isinstance(given, Path) else Path(folder) / "model.toml"
+        if isinstance(given, str):
+            path.write_text(given)
+        file = read(path)
+    return motion(file), {v.name: v.start for v in file.variables.values() if v.start is not None}
 
 
-def _line(name: str, numbers: Iterable[float]) -> str:
-    return f"{name} {' '.join(float(x).hex() for x in numbers)}\n"
+def scenario(
+    given: str | Path,
+    times: Sequence[float],
+    initial: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    inputs: Mapping[str, Sequence[float]] | None = None,
+) -> Any:
+    """What a proof needs of a scenario: values of the file, but for these; inputs are held."""
+    values = model(given)[1] | dict(parameters or {}) | dict(initial or {})
+    return SimpleNamespace(
+        path=Path("model.toml"), start=times[0], times=np.array(times), initial=initial or {},
+        start_values=values,
+        input=lambda name: np.array((inputs or {}).get(name, [values[name]] * len(times))),
+    )  # fmt: skip
 
 
-def _balls(middles: Sequence[float], radii: Sequence[float]) -> np.ndarray:
-    return np.column_stack((middles, np.zeros(len(middles)), radii)).ravel()
+def enclose(
+    given: str | Path,
+    times: Sequence[float],
+    within: Mapping[str, float] | None = None,
+    **more: Any,
+) -> Enclosure:
+    """Enclose states and outputs at these times."""
+    prover = Prover(model(given)[0], with_outputs=True)
+    return prover.enclose(scenario(given, times, **more), within)
 
 
-def _four(cubic: Cubic) -> list[float]:
-    return [*cubic, 0.0, 0.0, 0.0, 0.0][:4]
+def holds(enclosure: Enclosure, row: int, exact: Mapping[str, arb]) -> bool:
+    """Whether intervals contain values, which are known far better."""
+    for name, x in exact.items():
+        i = enclosure.names.index(name)
+        high, low, radius = (
+            float(part[row, i]) for part in (enclosure.high, enclosure.low, enclosure.radius)
+        )
+        if x.rad() > 1e-60 * max(1, abs(x).upper()) or abs(x - arb(high) - arb(low)) > arb(radius):
+            return False
+    return True
 
 
-def run(
-    problem: str, certificate: Path | None = None, program: Path = PROGRAM
-) -> subprocess.CompletedProcess[str]:
-    """Run the program on a problem's text."""
-    arguments = [program] + ([certificate] if certificate else [])
-    return subprocess.run(arguments, input=problem, capture_output=True, text=True, timeout=60)
+# ---- Certificates --------------------------------------------------------------------------------
+class Certified:
+    """A problem, what the program prints, and its certificate, in lines."""
+
+    def __init__(
+        self, given: str | Path, times: Sequence[float], within: float = 0.0, **more: Any
+    ) -> None:
+        problem = Problem(model(given)[0], scenario(given, times, **more), with_outputs=True)
+        start = {name: (float(problem.known[name]), within) for name in problem.states}
+        self.problem = [*problem.text(start)]
+
+    def run(self, program: Path | None = None) -> subprocess.CompletedProcess[str]:
+        """Run the program; its points and claims are kept."""
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "certificate"
+            command = [program or project.proof_program(), file]
+            text = "".join(self.problem)
+            ended = subprocess.run(command, input=text, capture_output=True, text=True, timeout=60)
+            self.points, self.claims = ended.stdout.splitlines(), file.read_text().splitlines()
+        return ended
+
+    def check(self) -> int:
+        """Check it; the number of steps."""
+        return checker.check(self.problem, self.points, self.claims)
 
 
-def enclosures(problem: str, program: Path = PROGRAM) -> np.ndarray:
-    """hi, lo and radius of states and outputs at all communication points, (points, 14, 3)."""
-    answer = run(problem, program=program)
-    assert answer.returncode == 0, answer.stdout[-80:] + answer.stderr
-    rows = [line.split()[2:] for line in answer.stdout.splitlines()]
-    return np.array([[float.fromhex(word) for word in row] for row in rows]).reshape(-1, 14, 3)
-
-
-ZERO = (0.0,)
-# Between them they take every branch: free motion in long steps, uncertain starts and parameters,
-# sampled and smooth inputs, and a step that is far too long for what happens in it.
+PENDULUM = """
+name = "Pendulum"
+experiment = { stop = 10.0, step = 0.5 }
+[parameters]
+g = { start = 9.81 }
+l = { start = 0.7 }
+[states]
+phi = { start = 2.5, derivative = "w" }
+w = { derivative = "-g / l * sin(phi)" }
+"""
+# every function, and an input; each operation moves
+FUNCTIONS = """
+name = "Functions"
+[inputs]
+u = { start = 0.3 }
+[states]
+x = { start = 0.4, derivative = "y * exp(-x) + u" }
+y = { start = 0.3, derivative = "sin(x) * sqrt(1 + y**2) - log(1.5 + x) + 0.1 * time" }
+z = { start = 0.2, derivative = "atan(x * y) + tanh(y) - cos(time) / (2 + x) - z" }
+[outputs]
+sum = { value = "x + y / 3" }
+product = { value = "(x / 3) * (y / 7)" }
+quotient = { value = "(x / 3) / (y / 7)" }
+angles = { value = "tan(x) + asin(y) + acos(x) + atan2(y, x)" }
+powers = { value = "sinh(y) + cosh(x) + hypot(x, y) + x**2.5 + y**-3" }
+late = { value = "time * x" }
+"""
 SMALL = {
-    "free": Problem((0.3, 0.1, 0.5, -0.2), [(0.25, ZERO, ZERO)]),
-    "held": Problem(
-        (-1.43, 0.58, 1.97, 0.12),
-        [(0.001 * (i + 1), (-0.7 + 0.01 * i,), (-12.0 - 0.02 * i,)) for i in range(8)],
-        start=0.0,
+    "arm": Certified(ARM, [0.0, 0.001, 0.1, 0.35], inputs={
+        "tau1": [1.0, -0.7, 3.0, 0.0], "f2": [-9.0, -12.0, 2.0, 0.0],
+    }),
+    "uncertain": Certified(PENDULUM, [0.0, 0.1, 0.3], 1e-4),
+    "functions": Certified(FUNCTIONS, [0.0, 0.2, 1.0]),
+    "ball": Certified(EXAMPLES / "bouncing_ball.toml", [0.0, 0.3, 0.6]),
+    "switch": Certified(
+        'name = "S"\n[states]\nx = { derivative = "1 if time < 0.7 else 2" }', [0.0, 0.5, 1.0]
     ),
-    "smooth": Problem(
-        (-1.43, 0.58, 1.97, 0.12),
-        [(1.1, (0.5, -1.0, 3.0, -20.0), (-10.0, 2.0, 1.0, 5.0)), (1.25, (1.0,), (-8.0, 40.0))],
-        sines=[(0, 2.28, 0.42, 0.03), (0, 2.5, 1.6, 0.4), (1, 2.09, 0.57, -1.77)],
-        start=1.0,
-    ),
-    "uncertain": Problem(
-        (-1.0, 0.3, 1.0, 0.5),
-        [(0.2, (1.0,), (-9.0,)), (0.4, (0.5,), (-9.0,))],
-        radii=(1e-3, 1e-4, 0.0, 1e-5),
-        parameter_radii=(0.0, 1e-5, 0.0, 0.0, 1e-6, 0.0, 1e-6, 0.0),
-    ),
-    "vague": Problem(
-        (-1.0, 0.3, 1.0, 0.5),
-        [(0.02, (1.0,), (-9.0,))],
-        parameter_radii=(0.1, 0.2, 0.01, 0.0, 0.05, 0.02, 0.05, 0.5),
-    ),
-    "sudden": Problem(
-        (0.1, 0.4, 0.0, 0.0),
-        [(0.1, ZERO, (0.98,)), (0.2, (0.0, 0.0, 0.0, 3e7), ZERO), (0.3, (8e3,), (-4e3,))],
-        parameters=(*PARAMETERS[:7], 0.1),
-    ),
-}
+    "lorenz": Certified(EXAMPLES / "lorenz.toml", [0.0, 2.0]),
+}  # fmt: skip
 # no box holds the motions of so many states over the step: the proof must stop
-TOO_BROAD = Problem((-1.0, 0.3, 1.0, 0.5), [(0.1, (1.0,), (-9.0,))], radii=(0.4, 0.1, 0.6, 0.6))
+TOO_BROAD = Certified(EXAMPLES / "lorenz.toml", [0.0, 1.0], 5.0)

@@ -15,17 +15,21 @@ import pytest
 from flint import arb
 
 import rparm
-from rparm import project, proof
+from rparm import project
 from rparm.__main__ import main
 from rparm.commands import prove
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
+from rparm.proof import checker, enclosure
+from rparm.proof import errors as proof
 from rparm.runs import comparison
 from rparm.runs import scenario as scenarios
 from rparm.units import minus, rounded_up
+from tests.equations.examples import FOLDER, quick
+from tests.prove.problems import PENDULUM
 from tests.support.rparm_project import MISTAKES
 
-PROVER = proof.provers()["rp_manipulator"]
+PROVER = enclosure.provers()["rp_manipulator"]
 STATES = {"q1", "q2", "dq1", "dq2"}
 OWN = """
 model = "rp_manipulator"
@@ -69,12 +73,12 @@ def test_errors_of_each_method(own: Path, capsys: pytest.CaptureFixture[str]) ->
 def test_proven_error_is_what_a_run_and_the_interval_say(own: Path) -> None:
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(own, fmu.model)
-        enclosure = PROVER.enclose(scenario).of(PROVER.states)
-        bounds = proof.error_bounds(fmu, scenario, enclosure, "erk", 1e-8)
-        error = proof.largest_errors(bounds, enclosure)["q1"]
+        found = PROVER.enclose(scenario).of(PROVER.states)
+        bounds = proof.error_bounds(fmu, scenario, found, "erk", 1e-8)
+        error = proof.largest_errors(bounds, found)["q1"]
     own.write_text(OWN + '[parameters]\nsolver_method = "erk"\n')
     run = rparm.Scenario(own).run()
-    apart = np.abs(run["q1"] - enclosure.high[:, 0])
+    apart = np.abs(run["q1"] - found.high[:, 0])
     assert error.error == pytest.approx(apart.max(), rel=1e-3)
     assert error.at == run["time"][apart.argmax()]
 
@@ -115,6 +119,66 @@ def test_taylor_is_proven_to_1e_13_in_all_scenarios(path: Path) -> None:
     assert errors.max() <= 1e-13
 
 
+# ---- Models of equations -------------------------------------------------------------------------
+
+OF_EQUATIONS = {  # the largest error that is proven, and how wide intervals are at most
+    "van_der_pol": (1e-7, 1e-26), "lorenz": (1e-2, 1e-20), "two_body_orbit": (10.0, 1e-13),
+    "dc_motor": (1e-6, 1e-26), "bouncing_ball": (1e-9, 1e-28), "pendulum": (1e-5, 1e-24),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OF_EQUATIONS)
+def test_a_file_with_equations(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its experiment runs, as a scenario that says the same, up to the first event."""
+    path = FOLDER / f"{name}.toml"
+    if name == "pendulum":
+        path = tmp_path / "pendulum.toml"
+        path.write_text(PENDULUM)
+    most, widest = OF_EQUATIONS[name]
+    checked = ["--check"] if name in ("pendulum", "bouncing_ball") else []
+    found = document(capsys, str(path), *checked)
+    assert found["exit_code"] == 0 and len(found["methods"]) == 4
+    for errors in found["methods"].values():
+        for error in errors.values():
+            assert 0 < error["radius"] < widest and error["error"] < most
+    assert not checked or found["checked"]["steps"] > 10
+    event = (found["event"], found["holds_up_to"]) if "event" in found else None
+    ball = ("event impact (h < 0)", pytest.approx(math.sqrt(2 / 9.81)))
+    assert event == (ball if name == "bouncing_ball" else None)
+
+
+def test_a_scenario_of_a_model_of_equations(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its FMU has the equations with it; values and held inputs are those of the scenario."""
+    fmu = quick(FOLDER / "dc_motor.toml", tmp_path / "built")
+    path = tmp_path / "run.toml"
+    head = OWN.replace('model = "rp_manipulator"', f'fmu = "{fmu.name}"').partition("[initial]")[0]
+    path.write_text(f"{head}[parameters]\nR = 2.0\n[inputs.voltage]\ntable = [[0, 0], [0.2, 6]]\n")
+    fmu.rename(tmp_path / fmu.name)
+    found = document(capsys, str(path), "--check", "--method", "taylor")
+    assert found["exit_code"] == 0
+    assert all(
+        e["radius"] < 1e-26 and e["error"] < 1e-6 for e in found["methods"]["taylor"].values()
+    )
+
+
+def test_what_cannot_be_enclosed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "model.toml"
+    head = 'name = "M"\nexperiment = { stop = 2.0, step = 0.5 }\n[states]\n'
+    path.write_text(head + 'x = { start = 1.0, derivative = "-1 / x" }')
+    assert main(["prove", str(path), "--quiet", "--output", str(tmp_path)]) == 1
+    (line,) = capsys.readouterr().out.splitlines()
+    reason = "no further: [states]: x: derivative: -1 / x: the divisor may be 0"
+    assert line.startswith("failed: the proof holds up to 0.4999999999") and line.endswith(reason)
+    path.write_text(head + 'x = { derivative = "1" }\n[sampled.s]\nevery = "1"\nset = { x = "0" }')
+    assert main(["prove", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert str(path) in line
+
+
 # ---- References ----------------------------------------------------------------------------------
 
 
@@ -130,7 +194,7 @@ def test_references(capsys: pytest.CaptureFixture[str]) -> None:
 def copies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Copies of the references, which `prove` reads."""
     folder = tmp_path / "references"
-    shutil.copytree(project.references(PROVER.folder), folder)
+    shutil.copytree(project.references(project.model("rp_manipulator")), folder)
     monkeypatch.setattr(project, "references", lambda _: folder)
     return folder
 
@@ -165,7 +229,7 @@ def test_every_wrong_value_of_a_reference_is_found(name: str, copies: Path) -> N
     draw = random.Random(40)
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(project.scenario_file(name), fmu.model)
-        enclosure = PROVER.enclose(scenario)
+        exact = PROVER.enclose(scenario)
         right = comparison.load_reference(scenario, fmu.model)
         assert list(right.names) == COLUMNS
         for i, column in enumerate(COLUMNS):
@@ -176,7 +240,7 @@ def test_every_wrong_value_of_a_reference_is_found(name: str, copies: Path) -> N
                     planted = replace(right, values=values)
                     with pytest.MonkeyPatch.context() as patch:
                         patch.setattr(comparison, "load_reference", lambda *_, x=planted: x)
-                        good = proof.proven_reference(fmu, scenario, enclosure)
+                        good = proof.proven_reference(fmu, scenario, exact)
                     (wrong,) = good.wrong
                     assert not good.passed and good.values - good.nearest == 1, kind
                     assert (wrong.line, wrong.column) == (row + 2, column), kind
@@ -230,22 +294,22 @@ def test_a_truncated_reference_is_refused(copies: Path, capsys: pytest.CaptureFi
     assert f"{path}, line 362: is cut off in the middle" in capsys.readouterr().err
 
 
-def around_one(low: float) -> proof.Enclosure:
+def around_one(low: float) -> enclosure.Enclosure:
     """A tiny interval around 1 + low."""
     one = np.ones((1, 1))
-    return proof.Enclosure(np.zeros(1), ("x",), one, low * one, 1e-20 * one, None, ())
+    return enclosure.Enclosure(np.zeros(1), ("x",), one, low * one, 1e-20 * one, None, ())
 
 
 def test_a_value_that_is_not_the_nearest_is_not_called_so() -> None:
     one = np.ones((1, 1))
-    enclosure = around_one(0.0)
+    exact = around_one(0.0)
     rows = np.arange(1)
     above, below = np.nextafter(one, 2), np.nextafter(one, 0)
-    assert proof.is_nearest(one, enclosure, rows)
+    assert proof.is_nearest(one, exact, rows)
     assert proof.is_nearest(one, around_one(2.0**-53 * 0.99), rows)
     assert not proof.is_nearest(one, around_one(-(2.0**-53) * 0.51), rows)  # doubles are denser
-    assert not proof.is_nearest(above, enclosure, rows)
-    assert not proof.is_nearest(below, enclosure, rows)
+    assert not proof.is_nearest(above, exact, rows)
+    assert not proof.is_nearest(below, exact, rows)
     assert not proof.is_nearest(one, around_one(2.0**-53), rows)  # between two doubles
 
 
@@ -263,8 +327,6 @@ def test_mistakes(arguments: list[str], text: str, capsys: pytest.CaptureFixture
 
 
 def test_a_wrong_certificate_is_no_proof(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    checker = PROVER._checker("check")
-
     def refuse(*_: object) -> int:
         raise checker.WrongClaim("box of state 0")
 
@@ -311,7 +373,7 @@ def test_a_broad_start_is_proven_in_pieces() -> None:
 
 def test_halves_cover_a_start() -> None:
     start = {"x": (0.1, 0.3), "y": (1.0, 0.0)}
-    left, right = proof.halves(start)
+    left, right = enclosure.halves(start)
     assert left["y"] == right["y"] == (1.0, 0.0)
     ends = [(Fraction(value), Fraction(radius)) for value, radius in (left["x"], right["x"])]
     assert ends[0][0] - ends[0][1] <= Fraction(0.1) - Fraction(0.3)

@@ -44,6 +44,11 @@ static inline struct ball ball_around(double value, double radius) {
     return (struct ball){value, 0.0, radius};
 }
 
+/* All numbers: what has no value that could be bounded. */
+static inline struct ball ball_unbounded(void) {
+    return ball_around(0.0, (double)INFINITY);
+}
+
 static inline struct ball ball_midpoint(struct ball x) {
     return (struct ball){x.hi, x.lo, 0.0};
 }
@@ -168,53 +173,4 @@ static inline struct ball ball_quotient(struct ball x, struct ball y) {
     const bool divides = smallest > 0.0;
     quotient.radius = divides ? (remainder / smallest + TINY) * OUTWARD : (double)INFINITY;
     return quotient;
-}
-
-/* ---- Sine and cosine ------------------------------------------------------------------------ */
-
-/* first (1 - y / ((k + 1) (k + 2)) + y^2 / ((k + 1) ... (k + 4)) - ...) for 0 <= y < 1: terms
- * alternate and fall, so that the first one that is left out bounds the rest (Leibniz). */
-static inline struct ball ball_alternating(struct ball first, struct ball y, double k) {
-    const double small = 0x1p-100 * (fabs(first.hi) + 0x1p-700);
-    struct ball sum = first;
-    struct ball term = first;
-    for (;;) {
-        term = ball_quotient(ball_product(term, y), ball_exact(-(k + 1.0) * (k + 2.0)));
-        if (!(ball_largest(term) > small)) { // also: no number
-            return ball_widened(sum, ball_largest(term));
-        }
-        sum = ball_sum(sum, term);
-        k += 2.0;
-    }
-}
-
-/* sin x and 1 - cos x of a midpoint, by sin 2x = 2 sin x (1 - (1 - cos x)), 1 - cos 2x = 2 sin^2 x
- */
-static inline void ball_sine_and_versine(struct ball x, struct ball *sine, struct ball *versine) {
-    int doublings = 0;
-    // NOLINTNEXTLINE(cert-flp30-c, clang-analyzer-security.FloatLoopCounter): halving is exact
-    for (double size = fabs(x.hi); size >= 0x1p-4; size *= 0.5) {
-        x = ball_scaled(x, 0.5);
-        doublings++;
-    }
-    const struct ball square = ball_product(x, x);
-    *sine = ball_alternating(x, square, 1.0);
-    *versine = ball_alternating(ball_scaled(square, 0.5), square, 2.0);
-    for (int i = 0; i < doublings; i++) {
-        const struct ball s = *sine;
-        *sine = ball_scaled(ball_difference(s, ball_product(s, *versine)), 2.0);
-        *versine = ball_scaled(ball_product(s, s), 2.0);
-    }
-}
-
-/* sin x and cos x. Both change by no more than x does. */
-static inline void ball_sine_and_cosine(struct ball x, struct ball *sine, struct ball *cosine) {
-    struct ball s, versine;
-    if (!(fabs(x.hi) <= 0x1p30)) {
-        *sine = *cosine = ball_around(0.0, INFINITY);
-        return;
-    }
-    ball_sine_and_versine(ball_midpoint(x), &s, &versine);
-    *sine = ball_widened(s, x.radius);
-    *cosine = ball_widened(ball_difference(ball_exact(1.0), versine), x.radius);
 }

@@ -1,0 +1,1 @@
+"""Proven errors of runs and references, for models of equations."""
