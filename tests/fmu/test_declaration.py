@@ -40,7 +40,8 @@ def complaint(path: Path) -> str:
 def test_a_mistake_is_named(tmp_path: Path, case: tuple[str, ...]) -> None:
     part, old, new, *words = case
     model = MODELS[part]
-    variables = copied(model, tmp_path, below="tests" if model == "wheel" else "models")
+    below = {"wheel": "tests", "rp_trajectory": "tests/fmu"}.get(model, "models")
+    variables = copied(model, tmp_path, below=below)
     change(variables, old, new)
     text = complaint(variables)
     assert [word for word in words if word not in text] == []
