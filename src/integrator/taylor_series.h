@@ -9,7 +9,7 @@
 
 /* Largest number of rows that are on the stack if no later call reads them: there they are in a
  * cache even if many instances are stepped in turn. */
-enum { TAYLOR_FEW_ROWS = 8 };
+enum { TAYLOR_FEW_ROWS = 12 };
 
 static inline bool taylor_series_has_few_rows(const struct ode *ode) {
     return ode->series_row_count <= TAYLOR_FEW_ROWS;
