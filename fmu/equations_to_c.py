@@ -62,8 +62,8 @@ def main() -> None:
     for name, text in texts.items():
         write_if_changed(arguments.output / name, text)
     if arguments.depfile:
-        rule = dependencies(str(arguments.output / next(iter(texts))), files)
-        arguments.depfile.write_text(rule, encoding="utf-8")
+        rules = [dependencies(str(arguments.output / name), files) for name in texts]
+        arguments.depfile.write_text("".join(rules), encoding="utf-8")
 
 
 def _header(path: Path) -> tuple[dict[str, str], list[Path]]:
