@@ -138,7 +138,7 @@ static bool read_model(struct prover *prover, int starts[]) {
     model->nodes = calloc((size_t)model->count, sizeof(struct node));
     model->output = calloc((size_t)model->outputs + 1, sizeof(int));
     model->guard = calloc((size_t)model->guards + 1, sizeof(int));
-    model->positive = calloc((size_t)model->guards + 1, sizeof(int));
+    model->positive = calloc((size_t)model->guards + 1, sizeof(bool));
     model->input = calloc((size_t)model->inputs + 1, sizeof(struct ball));
     model->depends = calloc((size_t)model->count * (size_t)model->states, sizeof(bool));
     read = model->nodes != NULL && model->output != NULL && model->guard != NULL &&
@@ -275,21 +275,19 @@ static int enclose(struct prover *prover, FILE *certificate) {
     int starts[MOST_STATES];
     double from = 0.0, to = 0.0, longest = INFINITY;
     bool read = read_model(prover, starts) && read_name("start", word) && read_number(&from);
-    bool uncertain = false;
+    double radii[MOST_STATES] = {0};
     if (read) {
         series_values(&prover->centre, start, ball_exact(from), model->count);
     }
     for (int i = 0; i < model->states && read; i++) {
-        double radius = 0.0;
-        read = read_number(&radius) && radius >= 0.0;
-        start[i] = ball_widened(*series_row(&prover->centre, 0, starts[i]), radius);
-        uncertain = uncertain || radius > 0.0;
+        read = read_number(&radii[i]) && radii[i] >= 0.0;
+        start[i] = *series_row(&prover->centre, 0, starts[i]);
     }
     if (!read || !read_word(word)) {
         return wrong("expected a model of up to 64 states, and their starts in numbers");
     }
-    set_start(&set, start, model->states, uncertain);
-    for (bool is_first = true; is_first || read_word(word); is_first = false, from = to) {
+    set_start(&set, start, radii, model->states);
+    for (bool is_first = true; is_first || read_word(word); is_first = false) {
         read = strcmp(word, "to") == 0 && read_number(&to) && to > from;
         for (int i = 0; i < model->inputs && read; i++) {
             read = read_number(&model->input[i].hi);
@@ -310,6 +308,7 @@ static int enclose(struct prover *prover, FILE *certificate) {
         if (certificate != NULL) {
             fprintf(certificate, "point %a\n", to);
         }
+        from = to;
     }
     return DONE;
 }

@@ -123,7 +123,7 @@ static struct ball node_coefficient(const struct series *s, int i, int k, struct
                                     const struct ball per_order[ORDERS]) {
     const struct node *nodes = s->model->nodes, *node = nodes + i;
     const bool has_second = node->second >= 0;
-    const struct ball *x = node->operation >= SUM ? series_row(s, 0, node->first) : NULL;
+    const struct ball *x = series_row(s, 0, node->operation >= SUM ? node->first : i);
     const struct ball *y = has_second ? series_row(s, 0, node->second) : x;
     struct ball sum = ball_exact(0.0);
     switch (node->operation) {

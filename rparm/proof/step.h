@@ -57,13 +57,16 @@ struct prover {
 
 /* ---- Sets ----------------------------------------------------------------------------------- */
 
-/* The set of these starts, of which some are `uncertain` by more than roundings. */
-static void set_start(struct states_set *set, const struct ball start[], int n, bool uncertain) {
-    *set = (struct states_set){.sides = uncertain ? 2 * n : n};
+/* The set of these starts, each of which may be off by a radius. */
+static void set_start(struct states_set *set, const struct ball start[], const double radii[],
+                      int n) {
+    *set = (struct states_set){.sides = n};
     for (int i = 0; i < n; i++) {
         set->centre[i] = ball_midpoint(start[i]);
         set->side[i][i] = set->side[n + i][i] = 1.0;
-        set->radius[uncertain ? n + i : i] = start[i].radius;
+        set->radius[i] = start[i].radius;
+        set->radius[n + i] = radii[i];
+        set->sides = radii[i] > 0.0 ? 2 * n : set->sides;
     }
 }
 
@@ -208,7 +211,8 @@ static double coordinates_in(vectors_of frame, struct ball sides[][MOST_STATES],
         for (int j = 0; j < n; j++) {
             reach += fabs(frame[j][i]) * coordinates[j];
         }
-        largest = reach / small[i] < largest ? largest : reach / small[i]; // also: no number
+        const double relative = reach / small[i];
+        largest = relative <= DBL_MAX ? fmax(largest, relative) : (double)INFINITY;
     }
     return largest;
 }
