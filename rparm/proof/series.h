@@ -23,11 +23,11 @@ struct node {
     bool moves; /* it may have coefficients above order 0 */
 };
 
-/* The states come first, then what rates follow from, then slopes; of all else only values are
- * needed, first of guards. */
+/* The states come first, then what rates follow from, then guards and slopes; of all else only
+ * values are needed. */
 struct model {
     struct node *nodes;
-    int count, of_rates, of_series, of_guards;
+    int count, of_rates, of_series;
     int states, inputs, outputs, guards;
     int rate[MOST_STATES]; /* nodes: of each state, */
     int *output;           /* of each output, */
@@ -222,7 +222,7 @@ static void series_extend(struct series *s, struct ball step, int k,
 static int series_begin(struct series *s, const struct ball states[], struct ball time,
                         int directions) {
     s->directions = directions;
-    const int unbounded = series_values(s, states, time, s->model->of_guards);
+    const int unbounded = series_values(s, states, time, s->model->of_series);
     series_extend(s, ONE, 0, NULL);
     return unbounded;
 }
