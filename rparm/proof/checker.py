@@ -18,6 +18,7 @@ import flint
 from flint import arb, arb_mat, arb_series
 
 BITS = 192
+UNDERFLOW = 2.0**-800  # what is 0, but for underflow
 Series = Any  # arb_series, or arb of what rests
 ARITHMETIC = {"+": add, "-": sub, "*": mul, "/": truediv}
 FUNCTIONS: dict[str, Callable[[Series], Series]] = {
@@ -47,7 +48,7 @@ class Model:
 
     def __init__(self, lines: Iterator[list[str]]) -> None:
         counts = [int(word) for word in next(lines)[1:]]
-        self.count, self.of_rates, _, _, self.states, self.inputs, *_ = counts
+        self.count, self.of_rates, self.of_series, self.states, self.inputs, *_ = counts
         self.nodes = [next(lines) for _ in range(self.count)]
         self.rates, self.outputs, guards, self.starts = (
             [int(word) for word in next(lines)[1:]] for _ in range(4)
@@ -196,7 +197,7 @@ class Motion:
 
     def _values(self, states: Sequence[arb_series]) -> list[Series]:
         time = arb_series([self.begin, self.length])
-        count = self.model.of_rates
+        count = self.model.of_series
         return self.model.values(states, self.inputs, time, count, self.values)
 
     def jacobian(self, states: Sequence[arb_series], order: int) -> arb_mat:
@@ -276,12 +277,15 @@ class Checker:
         """Return the coefficients after the last order over the box, where no event is."""
         box = [arb(high) + arb(low) + around(arb(r)) for high, low, r in step.box]
         whole = begin + length * arb(0.5, 0.5)
-        values = self.model.values(box, self.inputs, whole, self.model.count)
+        over = Motion(self.model, box, self.inputs, whole, length)
+        found = over.states(step.order + 1)
+        at = self.model.values(self.set.hull(), self.inputs, begin, self.model.of_series)
         for i, (node, is_positive) in enumerate(self.model.guards):
-            if not (values[node] > 0 if is_positive else values[node] < 0):
+            x = arb_series([1]) * over.values[node]
+            decides = x[1] if at[node].abs_upper() <= UNDERFLOW else x[0]  # from 0 on the slope
+            if not (decides > 0 if is_positive else decides < 0):
                 raise WrongClaim(f"guard {i}")
-        over = Motion(self.model, box, self.inputs, whole, length).states(step.order + 1)
-        return [x[step.order + 1] for x in over]
+        return [x[step.order + 1] for x in found]
 
     def point(self, words: Sequence[str], time: float) -> None:
         """Check that the printed balls contain the set, and the outputs of all states in them."""

@@ -47,8 +47,8 @@ class Problem:
         The model's; inputs are real numbers.
     names : tuple of str
         What is enclosed: states, then outputs.
-    guards : dict of str to tuple
-        By what they are called: the node of a distance, and whether it is above 0.
+    guards : dict of int to tuple
+        By the node of a distance: whether it is above 0, and what it is called.
     """
 
     def __init__(self, model: Mapping[str, Any], scenario: Scenario, with_outputs: bool) -> None:
@@ -62,7 +62,7 @@ class Problem:
         self.inputs = tuple(n for n in model["inputs"] if n not in of_conditions)
         outputs = model["outputs"] if with_outputs else {}
         self.names = (*self.states, *outputs)
-        self.guards: dict[str, tuple[int, bool]] = {}
+        self.guards: dict[int, tuple[bool, str]] = {}
         self.known = dict(scenario.start_values)
         for name in set(model["inputs"]) - {*self.inputs}:
             self.known[name] = scenario.input(name)[0]
@@ -140,11 +140,11 @@ class Problem:
         op, arguments, name, _ = self.nodes[i]
         if op == "mode" and name in self.model["relations"]:
             relation = self.model["relations"][name]
-            self.guards[relation["text"]] = (relation["distance"], bool(self.values[i]))
+            self.guards[relation["distance"]] = bool(self.values[i]), relation["text"]
         elif op == "integer" and name in self.model["segments"]:
             for side, is_positive in (("low", True), ("high", False)):
                 relation = self.model["relations"][self.model["segments"][name][side]]
-                self.guards[f"{relation['text']}, {side}"] = relation["distance"], is_positive
+                self.guards[relation["distance"]] = is_positive, f"{relation['text']}, {side}"
         elif op in ("and", "or") and bool(self.values[i]) == (op == "or"):  # one decides
             self._keep(next(j for j in arguments if bool(self.values[j]) == (op == "or")))
         elif op not in ("isnan", "isfinite"):  # what is bounded is finite
@@ -170,7 +170,7 @@ class Problem:
             self.nodes.append(("-", [tick, tick + 1], "", 0.0))
             self.values += [self.scenario.start, at, -values[1]]
             self.places += [name] * 3
-            self.guards[name] = tick + 2, False
+            self.guards[tick + 2] = False, name
 
     # ---- As the program reads it -----------------------------------------------------------------
 
@@ -180,19 +180,15 @@ class Problem:
         self._needed(rates, of_rates)
         self._guard_changes()
         moves = self._moving()
-        of_slopes, last = dict(of_rates), -1
-        while len(of_slopes) > last:
-            last = len(of_slopes)
-            functions = [i for i in of_slopes if moves[i] and i in self.slopes]
-            self._needed([self.slopes[i] for i in functions], of_slopes)
         of_outputs: dict[int, None] = {}
-        self._needed(outputs, of_outputs)
         starts = [x["node"] for x in map(self.model["starts"].get, self.states) if type(x) is dict]
-        self._needed(starts, of_outputs)
-        of_guards, last = {}, -1
-        while len(self.guards) > last:  # distances may follow from other relations
-            last = len(self.guards)
-            self._needed([node for node, _ in self.guards.values()], of_guards)
+        self._needed([*outputs, *starts], of_outputs)
+        of_series, last = dict(of_rates), -1
+        while len(of_series) > last:  # distances may follow from other relations
+            last = len(of_series)
+            functions = [i for i in of_series if moves[i] and i in self.slopes]
+            self._needed([self.slopes[i] for i in functions], of_series)
+            self._needed(self.guards, of_series)
         place = {i: self.states.index(node[2]) for i, node in enumerate(self.nodes)
                  if node[0] == "state"}  # fmt: skip
         rows: list[tuple[str, list[int], float]] = [
@@ -200,7 +196,7 @@ class Problem:
         ]
         self.origins = [-1] * len(rows)  # nodes of the model by those of the program
         ends = []
-        for group in (of_rates, of_slopes, of_guards, of_outputs):
+        for group in (of_rates, of_series, of_outputs):
             for i in sorted(set(group) - place.keys()):
                 op, arguments, name, number = self.nodes[i]
                 if op == "if":
@@ -220,7 +216,7 @@ class Problem:
         sizes = (len(self.states), len(self.inputs), len(self.names), len(self.guards))
         self.first_start = len(rows)  # of nodes for starts, numbers that are added later
         self.place, self.ends, self.sizes = place, ends, sizes
-        in_series = set(of_slopes)
+        in_series = set(of_series)
         for k, (op, arguments, number) in enumerate(rows):
             words = [op, *map(str, arguments)]
             if op == "number":
@@ -232,8 +228,8 @@ class Problem:
             yield f"{' '.join(words)}\n"
         yield _line("rates", [place[i] for i in rates])
         yield _line("outputs", [*range(len(self.states)), *(place[i] for i in outputs)])
-        guards = [*self.guards.values()]
-        yield _line("guards", [*(place[i] for i, _ in guards), *(int(sign) for _, sign in guards)])
+        signs = [int(is_positive) for is_positive, _ in self.guards.values()]
+        yield _line("guards", [*(place[i] for i in self.guards), *signs])
 
     def _moving(self) -> list[bool]:
         """Whether each node changes along a motion."""
@@ -245,7 +241,7 @@ class Problem:
     def text(self, start: Start) -> Iterator[str]:
         """Write the question to the program, in lines."""
         scenario, count = self.scenario, self.first_start
-        yield _line("model", [count + len(self.states), *self.ends[:3], *self.sizes])
+        yield _line("model", [count + len(self.states), *self.ends[:2], *self.sizes])
         yield from self.lines[:count]
         numbers = []
         for name in self.states:
@@ -263,7 +259,7 @@ class Problem:
     def reason(self, obstacle: str, where: int) -> str:
         """Say what ends a proof: an event, or what the program cannot go past."""
         if obstacle == "event":
-            return [*self.guards][where]
+            return [*self.guards.values()][where][1]
         if obstacle == "undefined" and self.origins[where] >= 0:
             node = self.origins[where]
             what = UNBOUNDED.get(self.nodes[node][0], "may grow beyond all bounds")

@@ -122,23 +122,22 @@ static bool series_create(struct series *series, const struct model *model, int 
 static bool read_model(struct prover *prover, int starts[]) {
     struct model *model = &prover->model;
     char word[WORD];
-    int sizes[8];
-    bool read = read_name("model", word) && read_counts(sizes, 8, MOST_NODES);
-    if (!read || sizes[4] < 1 || sizes[4] > MOST_STATES || sizes[0] < sizes[4]) {
+    int sizes[7];
+    bool read = read_name("model", word) && read_counts(sizes, 7, MOST_NODES);
+    if (!read || sizes[3] < 1 || sizes[3] > MOST_STATES || sizes[0] < sizes[3]) {
         return false;
     }
     *model = (struct model){.count = sizes[0],
                             .of_rates = sizes[1],
                             .of_series = sizes[2],
-                            .of_guards = sizes[3],
-                            .states = sizes[4],
-                            .inputs = sizes[5],
-                            .outputs = sizes[6],
-                            .guards = sizes[7]};
+                            .states = sizes[3],
+                            .inputs = sizes[4],
+                            .outputs = sizes[5],
+                            .guards = sizes[6]};
     model->nodes = calloc((size_t)model->count, sizeof(struct node));
     model->output = calloc((size_t)model->outputs + 1, sizeof(int));
     model->guard = calloc((size_t)model->guards + 1, sizeof(int));
-    model->positive = calloc((size_t)model->guards + 1, sizeof(int));
+    model->positive = calloc((size_t)model->guards + 1, sizeof(bool));
     model->input = calloc((size_t)model->inputs + 1, sizeof(struct ball));
     model->depends = calloc((size_t)model->count * (size_t)model->states, sizeof(bool));
     read = model->nodes != NULL && model->output != NULL && model->guard != NULL &&
@@ -151,7 +150,7 @@ static bool read_model(struct prover *prover, int starts[]) {
     read = read && read_name("rates", word) &&
            read_counts(model->rate, model->states, model->of_rates) && read_name("outputs", word) &&
            read_counts(model->output, model->outputs, model->count) && read_name("guards", word) &&
-           read_counts(model->guard, model->guards, model->of_guards);
+           read_counts(model->guard, model->guards, model->of_series);
     for (int i = 0; i < model->guards && read; i++) {
         int positive = 0;
         read = read_counts(&positive, 1, 2);
@@ -218,13 +217,13 @@ static void find_undefined(struct prover *prover, const struct states_set *set, 
     const struct model *model = &prover->model;
     struct ball states[MOST_STATES];
     set_hull(set, model->states, states);
-    series_values(&prover->centre, states, step->begin, model->of_guards);
+    series_values(&prover->centre, states, step->begin, model->of_series);
     for (int i = 0; i < model->states; i++) {
         const struct ball rate = *series_row(&prover->centre, 0, model->rate[i]);
         states[i] = ball_widened(states[i], ball_largest(rate) * ahead);
     }
     const struct ball times = ball_widened(step->begin, ahead);
-    const int unbounded = series_values(&prover->centre, states, times, model->of_guards);
+    const int unbounded = series_values(&prover->centre, states, times, model->of_series);
     if (unbounded != NO_NODE) {
         step->obstacle = UNDEFINED;
         step->where = unbounded;
@@ -275,21 +274,19 @@ static int enclose(struct prover *prover, FILE *certificate) {
     int starts[MOST_STATES];
     double from = 0.0, to = 0.0, longest = INFINITY;
     bool read = read_model(prover, starts) && read_name("start", word) && read_number(&from);
-    bool uncertain = false;
+    double radii[MOST_STATES] = {0};
     if (read) {
         series_values(&prover->centre, start, ball_exact(from), model->count);
     }
     for (int i = 0; i < model->states && read; i++) {
-        double radius = 0.0;
-        read = read_number(&radius) && radius >= 0.0;
-        start[i] = ball_widened(*series_row(&prover->centre, 0, starts[i]), radius);
-        uncertain = uncertain || radius > 0.0;
+        read = read_number(&radii[i]) && radii[i] >= 0.0;
+        start[i] = *series_row(&prover->centre, 0, starts[i]);
     }
     if (!read || !read_word(word)) {
         return wrong("expected a model of up to 64 states, and their starts in numbers");
     }
-    set_start(&set, start, model->states, uncertain);
-    for (bool is_first = true; is_first || read_word(word); is_first = false, from = to) {
+    set_start(&set, start, radii, model->states);
+    for (bool is_first = true; is_first || read_word(word); is_first = false) {
         read = strcmp(word, "to") == 0 && read_number(&to) && to > from;
         for (int i = 0; i < model->inputs && read; i++) {
             read = read_number(&model->input[i].hi);
@@ -310,6 +307,7 @@ static int enclose(struct prover *prover, FILE *certificate) {
         if (certificate != NULL) {
             fprintf(certificate, "point %a\n", to);
         }
+        from = to;
     }
     return DONE;
 }

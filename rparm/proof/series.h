@@ -23,11 +23,11 @@ struct node {
     bool moves; /* it may have coefficients above order 0 */
 };
 
-/* The states come first, then what rates follow from, then slopes; of all else only values are
- * needed, first of guards. */
+/* The states come first, then what rates follow from, then guards and slopes; of all else only
+ * values are needed. */
 struct model {
     struct node *nodes;
-    int count, of_rates, of_series, of_guards;
+    int count, of_rates, of_series;
     int states, inputs, outputs, guards;
     int rate[MOST_STATES]; /* nodes: of each state, */
     int *output;           /* of each output, */
@@ -123,7 +123,7 @@ static struct ball node_coefficient(const struct series *s, int i, int k, struct
                                     const struct ball per_order[ORDERS]) {
     const struct node *nodes = s->model->nodes, *node = nodes + i;
     const bool has_second = node->second >= 0;
-    const struct ball *x = node->operation >= SUM ? series_row(s, 0, node->first) : NULL;
+    const struct ball *x = series_row(s, 0, node->operation >= SUM ? node->first : i);
     const struct ball *y = has_second ? series_row(s, 0, node->second) : x;
     struct ball sum = ball_exact(0.0);
     switch (node->operation) {
@@ -222,7 +222,7 @@ static void series_extend(struct series *s, struct ball step, int k,
 static int series_begin(struct series *s, const struct ball states[], struct ball time,
                         int directions) {
     s->directions = directions;
-    const int unbounded = series_values(s, states, time, s->model->of_guards);
+    const int unbounded = series_values(s, states, time, s->model->of_series);
     series_extend(s, ONE, 0, NULL);
     return unbounded;
 }

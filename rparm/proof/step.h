@@ -10,11 +10,12 @@
 #define ACCURATE  0x1p-98  /* a remainder that is small enough: in units of the state, */
 #define ROUNDED   0x1p-6  /* or of this share of the state: roundings of its value are no smaller */
 #define SHARE     0x1p-20 /* or a remainder that is a small part of the hull's radius */
-#define CLEARLY   1.25    /* by which a set is smaller along sides that have no right angles */
-#define ROOM      0x1p-8  /* by which a box is larger than what was estimated */
-#define CONFIRMED 0x1p-12 /* room that is left after the check, for another arithmetic */
-#define LOOSENED  0x1p-7  /* enlarges derivatives, for the same reason, */
-#define ALLOWED   1.0     /* and remainders, which differ more: by other recurrences */
+#define NOTHING   0x1p-800 /* what is 0, but for underflow */
+#define CLEARLY   1.25     /* by which a set is smaller along sides that have no right angles */
+#define ROOM      0x1p-8   /* by which a box is larger than what was estimated */
+#define CONFIRMED 0x1p-12  /* room that is left after the check, for another arithmetic */
+#define LOOSENED  0x1p-7   /* enlarges derivatives, for the same reason, */
+#define ALLOWED   1.0      /* and remainders, which differ more: by other recurrences */
 
 enum { SIDES = 2 * MOST_STATES };
 
@@ -57,13 +58,16 @@ struct prover {
 
 /* ---- Sets ----------------------------------------------------------------------------------- */
 
-/* The set of these starts, of which some are `uncertain` by more than roundings. */
-static void set_start(struct states_set *set, const struct ball start[], int n, bool uncertain) {
-    *set = (struct states_set){.sides = uncertain ? 2 * n : n};
+/* The set of these starts, each of which may be off by a radius. */
+static void set_start(struct states_set *set, const struct ball start[], const double radii[],
+                      int n) {
+    *set = (struct states_set){.sides = n};
     for (int i = 0; i < n; i++) {
         set->centre[i] = ball_midpoint(start[i]);
         set->side[i][i] = set->side[n + i][i] = 1.0;
-        set->radius[uncertain ? n + i : i] = start[i].radius;
+        set->radius[i] = start[i].radius;
+        set->radius[n + i] = radii[i];
+        set->sides = radii[i] > 0.0 ? 2 * n : set->sides;
     }
 }
 
@@ -208,7 +212,8 @@ static double coordinates_in(vectors_of frame, struct ball sides[][MOST_STATES],
         for (int j = 0; j < n; j++) {
             reach += fabs(frame[j][i]) * coordinates[j];
         }
-        largest = reach / small[i] < largest ? largest : reach / small[i]; // also: no number
+        const double relative = reach / small[i];
+        largest = relative <= DBL_MAX ? fmax(largest, relative) : (double)INFINITY;
     }
     return largest;
 }
@@ -264,12 +269,14 @@ static bool expand_centre(struct prover *prover, const struct states_set *before
     return size <= SMALL;
 }
 
-/* False: a guard may be 0 in the box, and `step` says which. */
-static bool is_guarded(const struct prover *prover, const struct series *series,
-                       struct step *step) {
+/* False: a guard may be 0 in the box after the begin of the step, and `step` says which. Where it
+ * is 0 at the begin, as at a start, its slope is what decides. */
+static bool is_guarded(const struct prover *prover, const struct series *box, struct step *step) {
     const struct model *model = &prover->model;
     for (int i = 0; i < model->guards; i++) {
-        const struct ball x = *series_row(series, 0, model->guard[i]);
+        const struct ball *row = series_row(box, 0, model->guard[i]);
+        const struct ball begin = *series_row(&prover->hull, 0, model->guard[i]);
+        const struct ball x = ball_largest(begin) <= NOTHING ? row[1] : row[0];
         if (!(ball_smallest(x) > 0.0 && (x.hi > 0.0) == model->positive[i])) {
             step->obstacle = EVENT;
             step->where = i;
@@ -305,11 +312,11 @@ static bool find_box(struct prover *prover) {
     if (!begin(series, step->box, times, 0, step)) {
         return false;
     }
-    if (!is_guarded(prover, series, step)) {
-        return false;
-    }
     for (int k = 1; k <= step->order + 1; k++) {
         series_extend(series, step->length, k, prover->per_order);
+    }
+    if (!is_guarded(prover, series, step)) {
+        return false;
     }
     bool inside = true, accurate = true;
     for (int i = 0; i < n; i++) {

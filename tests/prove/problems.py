@@ -141,6 +141,9 @@ SMALL = {
     "switch": Certified(
         'name = "S"\n[states]\nx = { derivative = "1 if time < 0.7 else 2" }', [0.0, 0.5, 1.0]
     ),
+    "corner": Certified(
+        'name = "C"\n[states]\nx = { derivative = "1 + abs(x)" }', [0.0, 0.4, 1.0]
+    ),
     "lorenz": Certified(EXAMPLES / "lorenz.toml", [0.0, 2.0]),
 }  # fmt: skip
 # no box holds the motions of so many states over the step: the proof must stop

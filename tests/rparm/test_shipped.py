@@ -107,7 +107,7 @@ def test_a_full_disk_leaves_nothing_behind(release: Path, tmp_path: Path) -> Non
 def archive(tmp_path: Path) -> Path:
     """Two files, one of them a program."""
     path = tmp_path / "archive.tar.xz"
-    path.write_bytes(packed([("project/a.h", CONTENT), ("x/proof/y/prove", b"#!/bin/true")]))
+    path.write_bytes(packed([("project/a.h", CONTENT), ("x/proof/prove", b"#!/bin/true")]))
     shipped.unpacked.cache_clear()
     return path
 
@@ -117,7 +117,7 @@ def test_an_archive_is_unpacked_and_what_is_broken_mended(
     archive: Path, tmp_path: Path, broken: str | None
 ) -> None:
     folder = shipped.unpacked(archive, tmp_path / "cache")
-    file, program = folder / "project" / "a.h", folder / "x" / "proof" / "y" / "prove"
+    file, program = folder / "project" / "a.h", folder / "x" / "proof" / "prove"
     file.unlink() if broken is None else file.write_text(broken)
     before = program.stat()
     shipped.unpacked.cache_clear()
