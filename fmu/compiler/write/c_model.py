@@ -281,8 +281,11 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value])
     return [f"if ({condition}) {{", *indented(code.lines), "}"]
 
 
-def _message(file: ModelFile, code: Code, given: str) -> str:
-    """Format and arguments of a message, in which values stand in the place of {NAME}."""
+def _message(file: ModelFile, code: Code, given: str, condition: Value) -> str:
+    """Format and arguments of a message, in which values stand in the place of {NAME}.
+
+    In a message without names there follow the parameters that the condition reads.
+    """
     parts = re.split(r"\{(\w+(?:\[[0-9,]+\])?)\}", given)
     form, arguments = parts[0].replace("%", "%%"), ""
     for name, rest in zip(parts[1::2], parts[2::2], strict=True):
@@ -290,9 +293,14 @@ def _message(file: ModelFile, code: Code, given: str) -> str:
         value = variable and (variable.leaf or variable.value)
         if value and {op for op, _ in value.leaves} <= {"parameter", "integer"}:
             shown = "%g" if variable.is_real else "%d"
-            found = code.of(value) if variable.is_real else f"(int){code.of(value)}"
-            arguments += f", {found} + 0.0" if variable.is_real else f", {found}"
+            found = code.of(value)
+            arguments += f", {found} + 0.0" if variable.is_real else f", (int){found}"
         form += shown + rest.replace("%", "%%")
+    if not arguments:
+        read = [v for v in file.of("parameters") if (v.leaf.op, v.name) in condition.leaves]
+        shown = ", ".join(f"{v.name} = %g" for v in read[:MOST_SHOWN])
+        form += shown and f" ({shown})"
+        arguments = "".join(f", {code.of(v.leaf)}" for v in read[:MOST_SHOWN])
     return text(form) + arguments
 
 
@@ -308,7 +316,7 @@ def _checks(file: ModelFile) -> list[str]:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
-        conditions.append((code.of(holds), _message(file, code, message)))
+        conditions.append((code.of(holds), _message(file, code, message, check.value)))
     lines = []
     for condition, message in conditions:
         why = f"    (void)snprintf(text, size, {message});"
