@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from ..expressions.expression import in_order
+from ..expressions.expression import RELATIONS, in_order
 from ..graph.band import band
 from ..graph.graph import FALLIBLE, Value, is_number
 from ..read.content import OPTIONS, ModelFile
@@ -54,7 +54,9 @@ def header(file: ModelFile) -> str:
 def source(file: ModelFile) -> str:
     """Return the text of equations.c."""
     events = Events(file)
-    series = Series(file.graph, *_followed(file, events), leaves(file))
+    followed = _followed(file, events)
+    has_kinks = _has_kinks(followed)
+    series = Series(file.graph, *(({}, []) if has_kinks else followed), leaves(file))
     has_domains = bool(events.located) and _may_end(file)
     smooth = _smooth(file)
     text = filled(
@@ -62,6 +64,7 @@ def source(file: ModelFile) -> str:
         **smooth,
         tables=[HERE],
         **_series(series, has_domains),
+        series_of_model=[] if has_kinks else [".series = &series,"],
         **_calculated(file, events),
         **_domains(file, events, series, has_domains, smooth["jacobian_size"]),
         events=events.functions("_in_domain" * has_domains),
@@ -172,6 +175,13 @@ def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list
     return rates, [events.signed(relation) for relation in events.located]
 
 
+def _has_kinks(followed: tuple[dict[Value, Value], list[Value]]) -> bool:
+    """Return whether a value that C compares decides on a rate or distance, without an event."""
+    rates, distances = followed
+    nodes = in_order([*rates.values(), *distances])
+    return any(v.op in RELATIONS and v.moves for v in nodes)
+
+
 def _series(series: Series, has_domains: bool) -> dict[str, object]:
     rows = [str(row) for row in series.row_of_followed]
     inner = series.inner()
@@ -193,7 +203,7 @@ def _series(series: Series, has_domains: bool) -> dict[str, object]:
 
 def _may_end(file: ModelFile) -> bool:
     """Return whether there are values beyond an event that are not finite."""
-    roots = [v.value for v in file.of("states", "where", "outputs")]
+    roots = [v.value for v in file.of("states", "where", "outputs") if v.shown]
     roots += [relation.distance for relation in file.graph.located]
     return any(v.op in FALLIBLE and v.arguments[-(v.op == "/")].moves for v in in_order(roots))
 
