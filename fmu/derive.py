@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from compiler.plain_c.text import CTextError, read
+from compiler.read.header import made, origin
 from compiler.write.derived import FORM, Derived, Wanted
 from generate import write_if_changed
 from program import program
@@ -28,7 +29,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="the C file")
     parser.add_argument("--depfile", type=Path, help="file for a rule of make: what was read")
     arguments = parser.parse_args()
-    text = read(arguments.file, arguments.include, arguments.ignore)
+    text = read(arguments.file, arguments.include, arguments.ignore, made)
     modes = {}
     for mode in arguments.mode:
         field, _, values = mode.partition("=")
@@ -41,7 +42,7 @@ def main() -> None:
     write_if_changed(arguments.output, result)
     arguments.output.touch()
     if arguments.depfile:
-        rule = dependencies(str(arguments.output), text.files)
+        rule = dependencies(str(arguments.output), [origin(path) for path in text.files])
         arguments.depfile.write_text(rule, encoding="utf-8")
 
 

@@ -57,6 +57,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
     "nominal": ABOVE_0,
     "start": {},
     "variability": {"enum": ["fixed", "discrete"]},
+    "causality": {"const": "local"},
     "shown": TRUTH,
     "derivative_of": WORD,
     "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ENUMERATION]},
@@ -74,6 +75,10 @@ def schema() -> Schema:
     about = {key: re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text) for key, text in rows}
     properties = _further(named)
     properties |= {section: _by_name(_entry(section), named) for section in reader.SECTIONS}
+    # entries of files that include others may be keys of theirs
+    alone = {section: properties[section] for section in reader.SECTIONS}
+    properties |= {section: _without_needs(own) for section, own in alone.items()}
+    alone = {"if": {"not": {"required": ["include"]}}, "then": {"properties": alone}}
     found = {key: {"description": about.get(key, key)} | properties[key] for key in reader.HEAD}
     some = [
         {"required": [section], "properties": {section: {"minProperties": 1}}}
@@ -86,7 +91,14 @@ def schema() -> Schema:
         ("functions", *CALCULATED), {"additionalProperties": {"required": ["value"]}}
     )
     only_in_c = {"if": {"not": {"required": ["code"]}}, "then": {"properties": with_value}}
-    return head | _table(found, "name") | {"anyOf": some} | only_in_c
+    return head | _table(found, "name") | {"anyOf": some, "allOf": [only_in_c, alone]}
+
+
+def _without_needs(schema: Any) -> Any:
+    """Return a schema of whose keys none is needed."""
+    if isinstance(schema, dict):
+        return {key: _without_needs(own) for key, own in schema.items() if key != "required"}
+    return [*map(_without_needs, schema)] if isinstance(schema, list) else schema
 
 
 def _further(named: Schema) -> dict[str, Schema]:

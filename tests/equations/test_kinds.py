@@ -14,7 +14,9 @@ from tests.equations.examples import METHODS, MODELS, initializing, loaded, made
 from tests.support.instances import Instance
 
 TEXTS = MODELS["kinds"]
-DELAY, EITHER, GEAR, NOISE = (TEXTS[name] for name in ("DELAY", "EITHER", "GEAR", "NOISE"))
+DELAY, EITHER, GEAR, NOISE, TIMES = (
+    TEXTS[name] for name in ("DELAY", "EITHER", "GEAR", "NOISE", "TIMES")
+)
 STATE = """name = "Checked"
 [parameters]
 p = { start = 1.0 }
@@ -215,3 +217,27 @@ def test_a_check_shows_values() -> None:
             unit.fmi.exitInitializationMode()
         # to loggers a message is a format
         assert unit.messages[-1].text == "100 %% of 2.5 and 2, not {q}"
+
+
+# ---- Without states ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("version", ["", "fmi3"])
+def test_a_condition_on_the_time_has_time_events(version: str) -> None:
+    """In Model Exchange importers see both sides of them; other outputs have none."""
+    fmu = made(TIMES)
+    path = fmu.parent / version / fmu.name
+    run = simulated(path, 2.0, 0.1, {}, fmi_type="ModelExchange")
+    held = run["held"].astype(int).tolist()
+    assert [run["time"][i] for i in range(1, len(held)) if held[i] != held[i - 1]] == [0.25, 1.0]
+    assert run["phase"] == pytest.approx(np.maximum(run["time"] - 0.25, 0.0), abs=1e-15)
+    assert [(v["description"]) for v in declared(read(fmu.with_suffix(".toml")))["variables"]
+            ["kind"]["items"].values()] == ["A short one", "A long one"]  # fmt: skip
+
+
+def test_a_check_reads_what_follows_from_parameters() -> None:
+    with Instance(loaded(made(TIMES)), logging_on=True) as unit:
+        unit.begin(release=0.125)
+        with pytest.raises(FMICallException, match="error"):
+            unit.fmi.exitInitializationMode()
+        assert unit.messages[-1].text == "a span of -0.125 s"

@@ -26,7 +26,10 @@ from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
 
 FILES = {
-    "model": [*EXAMPLES, ROOT / "models/rp_environment/rp_environment.toml"],
+    "model": [
+        *EXAMPLES,
+        *(path for path in ROOT.glob("models/*/rp_*.toml") if "lock" not in path.name),
+    ],
     "scenario": sorted(ROOT.glob("models/*/scenarios/*.toml")),
     "campaign": sorted(ROOT.glob("models/*/campaigns/*.toml")),
     "loop": sorted(ROOT.glob("models/*/loop.toml")),

@@ -4,7 +4,6 @@
  * equations: test_all_is_written.py. Models themselves have tests in their folders. */
 #include "equations.h" /* of RPEnvironment */
 #include "last_text.h"
-#include "rp_controller_model.h"
 #include "rp_plant_model.h"
 #include "rp_plant_modes.h"
 #include "rp_test_support.h"
@@ -14,14 +13,13 @@
 #include <string.h>
 #include <unity.h>
 
-enum { PLANT, CONTROLLER, WALL, SUBJECTS };
+enum { PLANT, WALL, SUBJECTS };
 enum { DOUBLES = 256, STATES = 4, INPUTS = 10, INDICATORS = 16, ROWS = 64, POINTS = 2000 };
 
 /* A value structure, of any model. */
 union point {
     double all[DOUBLES];
     struct rp_plant_values plant;
-    struct rp_controller_values controller;
     struct equations_values wall;
 };
 
@@ -98,27 +96,6 @@ static void place_plant(int n) {
     }
 }
 
-/* Each effort below its limit or beyond, with an integral part or without; also sampled. */
-static void place_controller(int n) {
-    struct rp_controller_values *v = &at.controller;
-    struct rp_controller_parameters *p = &v->parameters;
-    p->mode = RP_CONTROLLER_PD + n % 3;
-    v->payload_attached = one_of(2);
-    v->form = RP_CONTROLLER_CONTINUOUS;
-    sometimes_zero(p->Ki, 2);
-    v->integral[0] += copysign(64.0, v->integral[0]);
-    v->integral[1] -= copysign(64.0, v->integral[0]); // which D does not cancel
-    ASSERT_OK(model->outputs(v, now));
-    for (int i = 0; i < 2; i++) {
-        p->limit[i] = (one_of(2) == 0 ? 2.0 : 0.5) * fabs(v->unlimited[i]);
-    }
-    v->form = one_of(4) == 0 ? RP_CONTROLLER_SAMPLED : RP_CONTROLLER_CONTINUOUS;
-    v->samples = (struct rp_controller_samples){
-        .taken = 2.0, .shown = 1.0, .rate = {3.0, 4.0}, .command = {{5.0, 6.0}, {7.0, 8.0}}};
-}
-
-/* What decides a current: the command, the current's limits, the voltage's, or both, beyond the
- * no-load speed. */
 /* Pressed; on the way out, where the wall does not pull; outside. */
 static void place_wall(int n) {
     struct equations_values *v = &at.wall;
@@ -139,10 +116,6 @@ static const struct subject subjects[SUBJECTS] = {
       {PLACE(rp_plant_values, inputs), PLACE(rp_plant_values, ddq)}},
      {{PLACE(rp_plant_values, ddq), PLACE(rp_plant_values, payload_attached)},
       {PLACE(rp_plant_values, ee_position), END(rp_plant_values)}}, .place = place_plant},
-    [CONTROLLER] = {&rp_controller_model,
-     {{0, PLACE(rp_controller_values, parameters.sample_time)},
-      {PLACE(rp_controller_values, inputs), PLACE(rp_controller_values, payload_attached)}},
-     {{PLACE(rp_controller_values, dintegral), END(rp_controller_values)}}, .place = place_controller},
     [WALL] = {&equations_model, {{0, PLACE(equations_values, v_n_x)}},
      {{PLACE(equations_values, v_n_x), END(equations_values)}}, .place = place_wall},
 };
@@ -406,7 +379,7 @@ static void check(int which) {
 }
 
 static void test_each_model(void) {
-    static const char *const names[SUBJECTS] = {"plant", "controller", "wall"};
+    static const char *const names[SUBJECTS] = {"plant", "wall"};
     for (int which = 0; which < SUBJECTS; which++) {
         TEST_MESSAGE(names[which]); // the last one is the one that fails
         check(which);

@@ -24,8 +24,18 @@ CHANGED: dict[tuple[str, str, str], str] = {
         for column in ("output", "initial unknown")
     },
     **{
+        ("RPController", name, column): "a sample depends on the rates of the sample before"
+        for name, what in (
+            ("tau1", "output"),
+            ("f2", "output"),
+            ("dintegral1", "state derivative"),
+            ("dintegral2", "state derivative"),
+        )
+        for column in (what, "initial unknown")
+    },
+    **{
         (fmu, name, ""): "models of files with equations have it"
-        for fmu in ("RPSensor", "RPTrajectory")
+        for fmu in ("RPSensor", "RPTrajectory", "RPController")
         for name in ("event_count", "last_event_time", "max_events")
     },
 }

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from fmpy.fmi2 import FMU2Model
 
-from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
+from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.symbolic import (
     CASES,
     CONTROLLER_KNOWNS,
@@ -271,8 +271,71 @@ def test_same_bits_along_the_same_polynomial(
 # ---- What is refused -----------------------------------------------------------------------------
 
 
-def test_a_start_at_which_samples_have_no_times_is_refused(loaded: LoadedFmu) -> None:
+@pytest.mark.parametrize(
+    ("start", "values", "said"),
+    [
+        (1e12, {"sample_time": 0.01},
+         "sample_time = 0.01 s is refused: at a start time of 1e+12 s it must be 0.909495 s"),
+        (0.0, {"delay": 0.0625},
+         "delay = 0.0625 s is refused: it must not be above sample_time = 0 s"),
+        (0.0, {"delay": 0.0625, "sample_time": 0.03125},
+         "delay = 0.0625 s is refused: it must not be above sample_time = 0.03125 s"),
+        (0.0, {"sample_time": 0.999e-6},
+         "sample_time = 9.99e-07 s is refused: it must be 0, for a continuous law, or at least "
+         "1e-06 s"),
+    ],
+)  # fmt: skip
+def test_times_that_do_not_fit_are_refused(
+    loaded: LoadedFmu, start: float, values: dict[str, float], said: str
+) -> None:
     with Instance(loaded) as instance:
-        assert status_of(lambda: instance.initialize(start=1e12, sample_time=0.01)) == ERROR
-        text = "sample_time = 0.01 s is refused: at a start time of 1e+12 s it must be 0.909495 s"
-        assert text in instance.messages[-1].text
+        assert status_of(lambda: instance.initialize(start, **values)) == ERROR
+        assert said in instance.messages[-1].text
+    with Instance(loaded) as instance:
+        instance.initialize(sample_time=1e-6, delay=1e-6)
+
+
+@pytest.mark.parametrize("wrong", [{"Kp1": 1e308, "q1_ref": 10.0}, {"Ki1": 10.0, "q1_ref": 1e308}])
+def test_a_sample_that_is_not_finite_is_refused(
+    sampled: Callable[..., Instance], wrong: dict[str, float]
+) -> None:
+    instance = sampled(0.25, integral1=2.0)
+    before = instance.get("tau1", "integral1")
+    instance.set(**wrong)
+    assert status_of(lambda: instance.step(0.0, 0.3)) == DISCARD
+    assert "is not finite" in instance.messages[-1].text
+    assert instance.get("tau1", "integral1") == before
+
+
+# ---- Limits and payload --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_effort_at_its_limit_counts_as_beyond(loaded: LoadedFmu, side: float) -> None:
+    """Its derivative is that of the limit, exactly there, too, and inputs move it at once."""
+    with Instance(loaded) as instance:
+        instance.fmi.setInteger([loaded.references["mode"]], [PD])
+        instance.initialize(**GAINS, q1_ref=0.5 * side, tau1_max=18.75, integral1=0.0)
+        assert instance.get("tau1", "tau1_unlimited") == [18.75 * side, 18.75 * side]
+        effort, known = ([loaded.references[name]] for name in ("tau1", "q1_ref"))
+        assert instance.fmi.getDirectionalDerivative(effort, known, [1.0]) == [0.0]
+        instance.set(q1_ref=0.25 * side)
+        assert instance.get("tau1") == [9.375 * side]
+        assert instance.fmi.getDirectionalDerivative(effort, known, [1.0]) == [37.5]
+        instance.step(0.0, 1.0)
+        assert instance.count("event_count") == 0
+
+
+def test_a_sample_knows_the_payload(loaded: LoadedFmu) -> None:
+    """With the arm level and nothing else to do, the torque of the payload is its weight at L."""
+    arm = {"m1": 2.0, "m2": 1.0, "l1": 0.5, "lc1": 0.25, "a": 0.0, "g": 9.81, "payload_mass": 1.5}
+    with Instance(loaded) as instance:
+        instance.fmi.setInteger([loaded.references["mode"]], [LAWS["pd_gravity"]])
+        instance.initialize(**arm, sample_time=0.25, q2=0.2, q2_ref=0.2)
+        instance.step(0.0, 0.25)
+        bare = instance.get("tau1")[0]
+        instance.fmi.setBoolean([loaded.references["payload_attached"]], [True])
+        assert instance.get("tau1") == [bare]
+        instance.step(0.25, 0.25)
+        assert bare == pytest.approx(2.0 * 9.81 * 0.25 + 1.0 * 9.81 * 0.7, rel=1e-14)
+        assert instance.get("tau1")[0] - bare == pytest.approx(1.5 * 9.81 * 0.7, rel=1e-14)

@@ -1,7 +1,6 @@
 /* The controller: limits, and the integral part through the instance and the integrator.
  * test_controller.py compares values with sympy. */
-#include "rp_controller_law.h"
-#include "rp_controller_model.h"
+#include "rp_controller.h"
 #include "rp_test_support.h"
 #include "run_instance.h"
 #include "value_references.h"
@@ -13,17 +12,17 @@ void setUp(void) {
 /* ---- The law -------------------------------------------------------------------------------- */
 
 static void test_efforts_stay_within_their_limits(void) {
-    const struct rp_controller_parameters p = {.limit = {3.0, 0.0}};
+    static const double limits[2] = {3.0, 0.0};
     const double cases[][4] = {
         {3.5, 1e-300, 3.0, 0.0},     {-3.5, -1e-300, -3.0, -0.0},  {3.0, 0.0, 3.0, 0.0},
         {2.75, INFINITY, 2.75, 0.0}, {-INFINITY, -4.0, -3.0, 0.0}, {-2.75, 0.0, -2.75, 0.0},
     };
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
         for (int i = 0; i < 2; i++) {
-            TEST_ASSERT_TRUE(law_limited(&p, cases[k][i], i) == cases[k][2 + i]);
+            TEST_ASSERT_TRUE(law_limited(cases[k][i], limits[i]) == cases[k][2 + i]);
         }
     }
-    TEST_ASSERT_TRUE(isnan(law_limited(&p, NAN, 0)) && isnan(law_limited(&p, NAN, 1)));
+    TEST_ASSERT_TRUE(isnan(law_limited(NAN, 3.0)) && isnan(law_limited(NAN, 0.0)));
 }
 
 /* ---- The integral part ---------------------------------------------------------------------- */
@@ -33,7 +32,7 @@ static const double M = 0.75, Kp = 50.0, Kd = 8.0, Ki = 240.0, Tt = 0.125, limit
 static const double e = 0.25, de = -0.5;
 
 static void start(double gain, double tracking_time, double w) {
-    set_integer(RP_CONTROLLER_mode, RP_CONTROLLER_PD);
+    set_integer(RP_CONTROLLER_mode, RP_CONTROLLER_MODE_PD);
     set(RP_CONTROLLER_inertia1, M);
     set(RP_CONTROLLER_Kp1, Kp);
     set(RP_CONTROLLER_Kd1, Kd);

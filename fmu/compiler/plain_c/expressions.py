@@ -323,12 +323,13 @@ class Expressions(Memory):
 
     def relation(self, op: str, a: Value, b: Value, node: c_ast.Node) -> Value:
         """Compare real numbers."""
-        if not self.graph.has_switches:
-            a, b = (v.arguments[0] if v.op == "value_of" else v for v in (a, b))
+        is_decided = "value_of" in (a.op, b.op)  # at each evaluation, without an event
+        a, b = (v.arguments[0] if v.op == "value_of" else v for v in (a, b))
         if a.op == "number" and b.op == "number":
             return self.conditions.constant(RELATION[op](a.number, b.number))
         if op in RELATIONS:
-            return self.graph.relation(op, a, b)
+            compare = self.graph.value if is_decided else self.graph.relation
+            return compare(op, a, b)
         if self.graph.has_switches and (a.moves or b.moves):
             raise refused(node, f"{op} is for whole numbers: compare moving values by < or >")
         equal = self.graph.value("==", a, b)

@@ -101,6 +101,7 @@ class Variable:
     description: str = ""
     derivative_of: str = ""  # the state of which the FMU has it as the derivative
     variability: str = ""  # "fixed" or "discrete" if the file says so
+    causality: str = ""  # "local" of a state that is no output
     shown: bool = True  # the FMU has it as a variable
     expression: Expression | None = None  # derivative of a state, value of others
     initial: Expression | None = None  # start value that follows from parameters and inputs

@@ -6,6 +6,7 @@ variables. Elements of an array have their places in an array of C, from 0. What
 nor a condition has an enum.
 """
 
+import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -82,7 +83,7 @@ class Header:
     """The header of a file, and where each variable is in its struct of values."""
 
     def __init__(self, source: Source) -> None:
-        self.stem = source.path.stem
+        self.stem, self.folder = source.path.stem, source.path.parent
         self.inner = [Header(included) for included in source.included]
         inner = {name for header in self.inner for _, name in header.parameters()}
         tables = source.tables
@@ -136,7 +137,9 @@ class Header:
     def text(self) -> str:
         """The text of the header."""
         lines = [f"/* Made of {self.stem}.toml: change that file. */", "#pragma once", ""]
-        lines += [f'#include "{header.stem}{SUFFIX}"' for header in self.inner]
+        folders = [Path(os.path.relpath(header.folder, self.folder)) for header in self.inner]
+        paths = [f / (h.stem + SUFFIX) for f, h in zip(folders, self.inner, strict=True)]
+        lines += [f'#include "{path.as_posix()}"' for path in paths]
         for field in (*self.own, *(f for fields in self.variables.values() for f in fields)):
             lines += [*field.enum()]
         inner = [f"struct {h.stem}_parameters {h.stem};" for h in self.inner if h.has_parameters]

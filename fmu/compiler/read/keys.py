@@ -50,7 +50,7 @@ OF_ALL = ("start", "unit", "min", "max", "description")
 SECTIONS = {  # keys of their entries, and the one that each needs
     "parameters": ((*OF_ALL, "type", "variability"), "start"),
     "inputs": ((*OF_ALL, "type"), ""),
-    "states": ((*OF_ALL, "nominal", "derivative", "derivative_of"), "derivative"),
+    "states": ((*OF_ALL, "nominal", "derivative", "derivative_of", "causality"), "derivative"),
     "discrete": (("start", "unit", "description", "type", "shown"), ""),
     "where": ((*OF_VALUES, "type", "shown"), "value"),  # or expressions
     "outputs": ((*OF_VALUES, "type"), "value"),
@@ -171,6 +171,7 @@ READ = {
     "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
     "type": _type,
     "variability": TEXT,
+    "causality": _expect('"local"', str, lambda value: value == "local"),
     "shown": _expect("true or false", bool, lambda _: True),
     "description": plain_text,
     "unit": _unit,

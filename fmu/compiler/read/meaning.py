@@ -205,7 +205,7 @@ def _check_units(file: ModelFile) -> None:
         if expression.target:
             units.setdefault(expression.target, unit)
     for variable in file.of("where"):
-        if not variable.is_real:
+        if not variable.is_real or variable.unit or variable.display:
             continue
         with placed("[where]", variable.name):
             variable.exponents = _whole(units[variable.name])

@@ -99,8 +99,13 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
 def _check_constant(file: ModelFile, value: Value) -> None:
     """Check that a condition follows from parameters only."""
     known = {v.name for v in file.of("parameters", FOLLOWS, OPTIONS)}
-    if others := sorted(name or op for op, name in value.leaves if name not in known):
-        raise ModelFileError(f"follows from {others[0]}, which is no parameter")
+    todo = [*value.leaves]
+    for _, name in todo:
+        if name in file.graph.relations:
+            todo += file.graph.relations[name].distance.leaves
+    others = {name or op for op, name in todo} - known - file.graph.relations.keys()
+    if others:
+        raise ModelFileError(f"follows from {min(others)}, which is no parameter")
 
 
 def _written(

@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial, reduce
 
 from ..expressions.expression import CONDITION, WHOLE, Kind, in_order
 from ..graph.graph import MOVING, Graph, Relation, Value, is_unknown
@@ -153,7 +154,7 @@ class Events:
     def __init__(self, file: ModelFile) -> None:
         self.file, self.graph = file, file.graph
         graph, self.relations = file.graph, list(file.graph.relations.values())
-        read = [(v.value, None) for v in file.of("states", "where", "outputs")]
+        read = [(v.value, None) for v in file.of("states", "where", "outputs") if v.shown]
         for event in file.events:
             during = event.during and event.during.value
             read += [(event.when.value, during), *([(during, None)] if during else [])]
@@ -270,6 +271,7 @@ class Events:
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
+            **self._rest(),
             indicators=rolled(Code(arrays(file)).assign(indicators).lines)[0],
             compare=self._compare(),
             times=Code(leaves(file)).assign(times).lines,
@@ -284,6 +286,25 @@ class Events:
                 [text(file.relation_texts[places[r.name]][:100]) for r in self.located] or ["NULL"]
             ),
         ).splitlines()
+
+    def _rest(self) -> dict[str, list[str]]:
+        """When all states rest: where the conditions hold that make each rate 0."""
+        conditions, zero = [], self.graph.number(0.0)
+        for state in self.file.of("states"):
+            rate = state.value
+            if rate.op == "if" and rate.arguments[1] is zero and not rate.arguments[0].moves:
+                conditions.append(rate.arguments[0])
+            elif rate is not zero:
+                conditions = []
+                break
+        if not conditions:
+            return {"rest": [], "is_at_rest": []}
+        code = Code(leaves(self.file))
+        rests = code.of(reduce(partial(self.graph.value, "and"), conditions))
+        head = ["static bool is_at_rest(const void *values_pointer) {"]
+        head += ["    const struct equations_values *values = values_pointer;"]
+        body = indented([*code.lines, f"return {rests} != 0;"])
+        return {"rest": [*head, *body, "}", ""], "is_at_rest": [".is_at_rest = is_at_rest,"]}
 
     def _compare(self) -> list[str]:
         graph, states, inputs = self.graph, self.file.of("states"), self.file.of("inputs")

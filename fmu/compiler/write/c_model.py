@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from ..expressions.expression import in_order
+from ..expressions.expression import RELATIONS, in_order
 from ..graph.band import band
 from ..graph.graph import FALLIBLE, Value, is_number
 from ..read.content import OPTIONS, ModelFile
@@ -54,7 +54,9 @@ def header(file: ModelFile) -> str:
 def source(file: ModelFile) -> str:
     """Return the text of equations.c."""
     events = Events(file)
-    series = Series(file.graph, *_followed(file, events), leaves(file))
+    followed = _followed(file, events)
+    has_kinks = _has_kinks(followed)
+    series = Series(file.graph, *(({}, []) if has_kinks else followed), leaves(file))
     has_domains = bool(events.located) and _may_end(file)
     smooth = _smooth(file)
     text = filled(
@@ -62,6 +64,7 @@ def source(file: ModelFile) -> str:
         **smooth,
         tables=[HERE],
         **_series(series, has_domains),
+        series_of_model=[] if has_kinks else [".series = &series,"],
         **_calculated(file, events),
         **_domains(file, events, series, has_domains, smooth["jacobian_size"]),
         events=events.functions("_in_domain" * has_domains),
@@ -172,6 +175,13 @@ def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list
     return rates, [events.signed(relation) for relation in events.located]
 
 
+def _has_kinks(followed: tuple[dict[Value, Value], list[Value]]) -> bool:
+    """Return whether a value that C compares decides on a rate or distance, without an event."""
+    rates, distances = followed
+    nodes = in_order([*rates.values(), *distances])
+    return any(v.op in RELATIONS and v.moves for v in nodes)
+
+
 def _series(series: Series, has_domains: bool) -> dict[str, object]:
     rows = [str(row) for row in series.row_of_followed]
     inner = series.inner()
@@ -193,7 +203,7 @@ def _series(series: Series, has_domains: bool) -> dict[str, object]:
 
 def _may_end(file: ModelFile) -> bool:
     """Return whether there are values beyond an event that are not finite."""
-    roots = [v.value for v in file.of("states", "where", "outputs")]
+    roots = [v.value for v in file.of("states", "where", "outputs") if v.shown]
     roots += [relation.distance for relation in file.graph.located]
     return any(v.op in FALLIBLE and v.arguments[-(v.op == "/")].moves for v in in_order(roots))
 
@@ -281,8 +291,11 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value])
     return [f"if ({condition}) {{", *indented(code.lines), "}"]
 
 
-def _message(file: ModelFile, code: Code, given: str) -> str:
-    """Format and arguments of a message, in which values stand in the place of {NAME}."""
+def _message(file: ModelFile, code: Code, given: str, condition: Value) -> str:
+    """Format and arguments of a message, in which values stand in the place of {NAME}.
+
+    In a message without names there follow the parameters that the condition reads.
+    """
     parts = re.split(r"\{(\w+(?:\[[0-9,]+\])?)\}", given)
     form, arguments = parts[0].replace("%", "%%"), ""
     for name, rest in zip(parts[1::2], parts[2::2], strict=True):
@@ -290,9 +303,14 @@ def _message(file: ModelFile, code: Code, given: str) -> str:
         value = variable and (variable.leaf or variable.value)
         if value and {op for op, _ in value.leaves} <= {"parameter", "integer"}:
             shown = "%g" if variable.is_real else "%d"
-            found = code.of(value) if variable.is_real else f"(int){code.of(value)}"
-            arguments += f", {found} + 0.0" if variable.is_real else f", {found}"
+            found = code.of(value)
+            arguments += f", {found} + 0.0" if variable.is_real else f", (int){found}"
         form += shown + rest.replace("%", "%%")
+    if not arguments:
+        read = [v for v in file.of("parameters") if (v.leaf.op, v.name) in condition.leaves]
+        shown = ", ".join(f"{v.name} = %g" for v in read[:MOST_SHOWN])
+        form += shown and f" ({shown})"
+        arguments = "".join(f", {code.of(v.leaf)}" for v in read[:MOST_SHOWN])
     return text(form) + arguments
 
 
@@ -308,7 +326,7 @@ def _checks(file: ModelFile) -> list[str]:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
-        conditions.append((code.of(holds), _message(file, code, message)))
+        conditions.append((code.of(holds), _message(file, code, message, check.value)))
     lines = []
     for condition, message in conditions:
         why = f"    (void)snprintf(text, size, {message});"

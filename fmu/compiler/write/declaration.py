@@ -48,7 +48,7 @@ def solver_names() -> list[str]:
 def keys(file: ModelFile) -> list[Key]:
     """Return name and kind of each variable, in the order in which they get value references."""
     return [
-        *((v.name, CAUSALITIES[v.section]) for v in file.variables.values() if v.shown),
+        *((v.name, _causality(v)) for v in file.variables.values() if v.shown),
         *((f"der_{state.name}", "local") for state in _without_derivative(file)),
         *((mode, "mode") for mode in file.modes),
         *((name, "local") for name in _indicators(file)),
@@ -164,7 +164,12 @@ def modulated(file: ModelFile) -> list[str]:
 
     They compare with the time, with its part of a period, or with a state that samplers begin anew.
     """
-    begun = {("state", name) for sampler in file.sampled for name in sampler.reinit}
+    begun = {
+        ("state", name)
+        for sampler in file.sampled
+        for name, new in sampler.reinit.items()
+        if ("state", name) not in new.value.leaves
+    }
     saws = {
         ("integer", name)
         for name, segment in file.graph.segments.items()
@@ -192,6 +197,10 @@ def page(file: ModelFile) -> str:
     return f"{head}\n{fence}toml\n{file.text.rstrip()}\n{fence}\n"
 
 
+def _causality(variable: Variable) -> str:
+    return variable.causality or CAUSALITIES[variable.section]
+
+
 def _local(field: str) -> dict[str, object]:
     return {"field": field, "causality": "local", "variability": "continuous"}
 
@@ -200,7 +209,7 @@ def _entries_of(
     variable: Variable, file: ModelFile, units: dict[str, dict[str, int]]
 ) -> dict[str, object]:
     """Table of a variable of the file."""
-    causality = CAUSALITIES[variable.section]
+    causality = _causality(variable)
     if not variable.is_real:
         return _entries_of_count(variable, file)
     entries = _local(file.fields.value(variable.name)) | {"causality": causality}
@@ -247,7 +256,7 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
     entries: dict[str, object] = {
         "field": file.fields.count(variable.name),
         "type": TYPES.get(kind, "enumeration") if isinstance(kind, str) else "enumeration",
-        "causality": CAUSALITIES[variable.section],
+        "causality": _causality(variable),
         "variability": variability,
     }
     if isinstance(kind, tuple):
