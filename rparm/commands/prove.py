@@ -100,7 +100,7 @@ def _opened(path: Path) -> Iterator[tuple[Fmu, Scenario]]:
     with Fmu(path) as fmu, temporary_folder() as folder:
         file = folder / path.name
         text = scenarios.template(path.stem, scenarios.FMU, str(path.absolute()), fmu.model)
-        file.write_text(text, encoding="utf-8")
+        file.write_text(text, encoding="utf-8", newline="\n")
         scenario = scenarios.load(file, fmu.model)
         text = "As the model's file says, with inputs at their starts."
         yield fmu, replace(scenario, path=path, title=fmu.model.name, description=text)

@@ -163,9 +163,13 @@ def _struct(name: str, fields: Iterable[str]) -> list[str]:
     return [f"struct {name} {{", *(f"    {field}" for field in fields), "};", ""]
 
 
+def origin(path: Path) -> Path:
+    """Return NAME.toml in place of a file NAME_values.h that is not there."""
+    is_made = path.name.endswith(SUFFIX) and not path.is_file()
+    return path.with_name(path.name.removesuffix(SUFFIX) + ".toml") if is_made else path
+
+
 def made(path: Path) -> str | None:
     """Return the text of NAME_values.h if NAME.toml is beside it."""
-    if not path.name.endswith(SUFFIX) or path.is_file():
-        return None
-    file = path.with_name(path.name.removesuffix(SUFFIX) + ".toml")
-    return Header(source_of(file)).text() if file.is_file() else None
+    file = origin(path)
+    return Header(source_of(file)).text() if file != path and file.is_file() else None
