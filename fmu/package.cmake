@@ -129,7 +129,7 @@ function(add_fmu name)
   endif()
 
   # tables and model descriptions, again whenever a declaration changes
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/declaration/*.toml ${FMU_SOURCE_DIR}/fmi*/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/compiler/units.py ${FMU_SOURCE_DIR}/fmi*/*.py)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/program.py)
   set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${variables}
                --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)

@@ -15,7 +15,8 @@ include       further files, relative to this one, whose [variables] and [units]
               time_events (true: the model has time events), naming ("structured": names have
               indexes)
 [experiment]  start, stop, tolerance, step: the default experiment
-[units]       "name" = { exponents of the SI base units, display.NAME = factor }, beside units.toml
+[units]       "name" = { exponents of the SI base units, display.NAME = factor }, beside those of
+              STANDARD in compiler/units.py
 [variables.NAME]
     reference     value reference, unique, 0 to 99999
     owner         "model" (default) or "instance": the structure that holds the value
@@ -162,7 +163,7 @@ class Display(Table):
     offset: float = 0.0
 
 
-class Unit(Table):
+class UnitEntry(Table):
     """Exponents of the SI base units, and factors of the display units."""
 
     kg: int = 0
@@ -418,6 +419,6 @@ class File(Table):
     changes: dict[VariableName, Change] = {}
     model: Model | None = None
     experiment: Experiment | None = None
-    units: dict[str, Unit] = {}
+    units: dict[str, UnitEntry] = {}
     variables: dict[VariableName, AnyVariable] = {}
     terminals: dict[Identifier, Terminal] = {}

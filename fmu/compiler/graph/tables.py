@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..expressions.expression import finite_number
-from ..expressions.units import Measure
+from ..units import Unit
 
 LARGEST_FILE = 50_000_000  # bytes
 SEPARATORS = ",;\t"  # of columns; between others than commas, a comma may be a decimal point
@@ -72,7 +72,7 @@ class Table:
             yield self.array("c", i), dimensions, numbers
 
 
-def read(name: str, given: dict[str, Any], folder: Path, units: Mapping[str, Measure]) -> Table:
+def read(name: str, given: dict[str, Any], folder: Path, units: Mapping[str, Unit]) -> Table:
     """Read a table from its entry; a file's path counts from the folder. units: of x, y and z."""
     kind, outside = given.get("interpolation", "linear"), given.get("outside", "hold")
     for key, value, known in (
@@ -94,8 +94,8 @@ def read(name: str, given: dict[str, Any], folder: Path, units: Mapping[str, Mea
     return Table(name, *_with_outside(x, y, coefficients, kind, outside))
 
 
-def _in_si(values: list[float], unit: Measure | None) -> list[float]:
-    return [unit.in_si(value) for value in values] if unit and unit.is_display else values
+def _in_si(values: list[float], unit: Unit | None) -> list[float]:
+    return [unit.value(value) for value in values] if unit and unit.is_display else values
 
 
 # ---- Values --------------------------------------------------------------------------------------
@@ -271,7 +271,7 @@ def _with_outside(
     return (_held(x),), tuple(zip(below, *inside, above, strict=True))
 
 
-def _grid(name: str, given: dict[str, Any], outside: str, units: Mapping[str, Measure]) -> Table:
+def _grid(name: str, given: dict[str, Any], outside: str, units: Mapping[str, Unit]) -> Table:
     """Return a bilinear table; z has a row for each x."""
     if outside == "error":
         raise ValueError("outside: a table of two arguments holds or extends")
