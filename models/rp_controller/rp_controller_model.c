@@ -42,7 +42,7 @@ static enum status outputs(void *values, double t) {
     return STATUS_OK;
 }
 
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+static enum status derivatives(const void *values, double t, double dt, void *first, void *second) {
     rp_controller_derivatives(values, first, second);
     return STATUS_OK;
 }
@@ -75,11 +75,11 @@ const struct model rp_controller_model = {
                    sizeof(struct rp_controller_parameters)},
     .inputs = {offsetof(struct rp_controller_values, inputs), sizeof(struct rp_controller_inputs)},
     .states = {offsetof(struct rp_controller_values, integral), sizeof(double[2])},
-    .derivatives = {offsetof(struct rp_controller_values, dintegral), sizeof(double[2])},
+    .dx = {offsetof(struct rp_controller_values, dintegral), sizeof(double[2])},
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .outputs = outputs,
-    .propagate = propagate,
+    .derivatives = derivatives,
     .check_parameters = check_parameters,
     .events = &rp_controller_events,
 };

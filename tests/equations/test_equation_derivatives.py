@@ -81,7 +81,7 @@ def test_values_and_derivatives_along_a_curve(case: tuple) -> None:
     model.outputs(values, point["time"])
     curves = {n: [v[model.names.index(n)] for v in (values, first, second)] for n in NAMES}
     curves["time"] = [point["time"], dt, 0.0]
-    model.propagate(values, point["time"], dt, first, second)
+    model.derivatives(values, point["time"], dt, first, second)
     for name, text in texts.items():
         function = reference(text)
 
@@ -178,7 +178,7 @@ def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
         values = model.values(x=0.7, p=0.0)
         first, second = (model.values(x=x, p=0.3) for x in (0.2, -0.4))
         model.outputs(values, 0.0)
-        model.propagate(values, 0.0, 1.0, first, second)
+        model.derivatives(values, 0.0, 1.0, first, second)
         series = model.series(values, 0.0, 0.5, np.zeros((1, 4)), 20)
         found.append([values, first, second, model.jacobian(values, 0.0), series])
     for branch, alone in zip(*found, strict=True):
@@ -261,7 +261,7 @@ def test_derivatives_where_plain_rules_give_none(tmp_path: Path) -> None:
         assert np.isfinite(values[at]), rate
         for k, (by, slope) in enumerate(zip("xyp", expected, strict=True)):
             first = model.values(**{f"{by}{i}": 1.0})
-            model.propagate(values, 0.0, 0.0, first, model.values())
+            model.derivatives(values, 0.0, 0.0, first, model.values())
             for found in (first[at], *J[2 * i, 2 * i : 2 * i + 2][k : k + 1]):
                 is_right = found == slope if np.isfinite(slope) else not np.isfinite(found)
                 assert is_right, (rate, by)
