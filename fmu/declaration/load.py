@@ -94,7 +94,7 @@ def first_mistake(error: ValidationError) -> str:
     return ": ".join([*words, reason(mistake, table, key)])
 
 
-def place_of(location: list[str | int]) -> tuple[list[str], type[schema.Table], str]:
+def place_of(location: list[str | int]) -> tuple[list[str], type[schema.TomlTable], str]:
     """Return words for a table of the file, its class, and the path of the value within it."""
     match location:
         case ["model", *keys]:
@@ -123,7 +123,7 @@ def place_of(location: list[str | int]) -> tuple[list[str], type[schema.Table], 
     return words, table, path.removeprefix(".")
 
 
-def reason(mistake: Any, table: type[schema.Table], key: str) -> str:
+def reason(mistake: Any, table: type[schema.TomlTable], key: str) -> str:
     """Say why the value of a key is wrong, or why the table is, if `key` is empty."""
     context = mistake.get("ctx", {})
     subject = f"{key} = {shown(mistake['input'])} " if key else ""
@@ -147,7 +147,7 @@ def reason(mistake: Any, table: type[schema.Table], key: str) -> str:
     return subject + mistake["msg"].removeprefix("Input ")
 
 
-def keys_of(table: type[schema.Table]) -> list[str]:
+def keys_of(table: type[schema.TomlTable]) -> list[str]:
     return [field.alias or name for name, field in table.model_fields.items()]
 
 

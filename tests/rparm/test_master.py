@@ -9,7 +9,7 @@ import pytest
 
 from rparm.errors import CodeError, UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs.inputs import Table
+from rparm.runs.inputs import Polyline
 from rparm.systems import step_control
 from rparm.systems.master import Master, Snapshot
 from rparm.systems.python_component import PythonComponent
@@ -360,7 +360,7 @@ def python(folder: Path, text: str, name: str = "", **ends: list[str]) -> Python
 
 
 def test_signals_are_held_over_each_step(oscillator: Fmu) -> None:
-    signal = Table(((0.0, 0.0), (0.5, 2.0), (1.0, -1.0)))
+    signal = Polyline(((0.0, 0.0), (0.5, 2.0), (1.0, -1.0)))
     with Master({"a": oscillator}, [], signals={"a.u": signal}) as master:
         master.initialize(3.0, None, {"a": PARAMETERS["a"]})
         rows = master.run(3.0 + np.arange(STEPS + 1) * H)

@@ -26,7 +26,7 @@ from ..expressions.expression import (
     in_order,
     parse,
 )
-from ..graph.tables import Table
+from ..graph.tables import LookupTable
 from ..units import Unit, parsed
 from .code import CodeFile
 
@@ -187,7 +187,7 @@ class ModelFile:
     sizes: dict[str, int] = field(default_factory=dict)
     units: dict[str, Unit] = field(default_factory=dict)  # of [units]
     functions: dict[str, Function | Lookup] = field(default_factory=dict)
-    tables: dict[str, Table] = field(default_factory=dict)
+    tables: dict[str, LookupTable] = field(default_factory=dict)
     code: CodeFile | None = None
     header: Any = None  # of its struct of values, if it has C
     sources: list[Path] = field(default_factory=list)  # the files of equations, included ones first
