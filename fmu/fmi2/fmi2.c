@@ -4,7 +4,7 @@
 #include "derivatives.h"
 #include "fmi2Functions.h"
 #include "fmi2_functions.h"
-#include "fmu_state.h"
+#include "fmi_snapshot.h"
 #include "model_description.h"
 #include "stepping.h"
 #include "values.h"
@@ -221,30 +221,30 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 /* ---- FMU state ------------------------------------------------------------------------------ */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    return fmi2_status(fmu_state_save(c, CALL_fmi2GetFMUstate, FMUstate));
+    return fmi2_status(fmi_snapshot_save(c, CALL_fmi2GetFMUstate, FMUstate));
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-    return fmi2_status(fmu_state_restore(c, CALL_fmi2SetFMUstate, FMUstate));
+    return fmi2_status(fmi_snapshot_restore(c, CALL_fmi2SetFMUstate, FMUstate));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    return fmi2_status(fmu_state_free(c, CALL_fmi2FreeFMUstate, FMUstate));
+    return fmi2_status(fmi_snapshot_free(c, CALL_fmi2FreeFMUstate, FMUstate));
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
-    return fmi2_status(fmu_state_size(c, CALL_fmi2SerializedFMUstateSize, FMUstate, size));
+    return fmi2_status(fmi_snapshot_size(c, CALL_fmi2SerializedFMUstateSize, FMUstate, size));
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
                                  size_t size) {
-    return fmi2_status(fmu_state_serialize(c, CALL_fmi2SerializeFMUstate, FMUstate,
-                                           (unsigned char *)serializedState, size));
+    return fmi2_status(fmi_snapshot_serialize(c, CALL_fmi2SerializeFMUstate, FMUstate,
+                                              (unsigned char *)serializedState, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate *FMUstate) {
-    return fmi2_status(fmu_state_deserialize(
+    return fmi2_status(fmi_snapshot_deserialize(
         c, CALL_fmi2DeSerializeFMUstate, (const unsigned char *)serializedState, size, FMUstate));
 }
 

@@ -3,7 +3,7 @@
 #include "continuous_states.h"
 #include "derivatives.h"
 #include "fmi3_calls.h"
-#include "fmu_state.h"
+#include "fmi_snapshot.h"
 #include "model_description.h"
 #include "stepping.h"
 #include "values.h"
@@ -396,31 +396,32 @@ fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
 /* ---- FMU state ------------------------------------------------------------------------------ */
 
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    return fmi3_status(fmu_state_save(instance, CALL_fmi3GetFMUState, FMUState));
+    return fmi3_status(fmi_snapshot_save(instance, CALL_fmi3GetFMUState, FMUState));
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
-    return fmi3_status(fmu_state_restore(instance, CALL_fmi3SetFMUState, FMUState));
+    return fmi3_status(fmi_snapshot_restore(instance, CALL_fmi3SetFMUState, FMUState));
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    return fmi3_status(fmu_state_free(instance, CALL_fmi3FreeFMUState, FMUState));
+    return fmi3_status(fmi_snapshot_free(instance, CALL_fmi3FreeFMUState, FMUState));
 }
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size) {
-    return fmi3_status(fmu_state_size(instance, CALL_fmi3SerializedFMUStateSize, FMUState, size));
+    return fmi3_status(
+        fmi_snapshot_size(instance, CALL_fmi3SerializedFMUStateSize, FMUState, size));
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
                                  fmi3Byte serializedState[], size_t size) {
-    return fmi3_status(
-        fmu_state_serialize(instance, CALL_fmi3SerializeFMUState, FMUState, serializedState, size));
+    return fmi3_status(fmi_snapshot_serialize(instance, CALL_fmi3SerializeFMUState, FMUState,
+                                              serializedState, size));
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[],
                                    size_t size, fmi3FMUState *FMUState) {
-    return fmi3_status(fmu_state_deserialize(instance, CALL_fmi3DeserializeFMUState,
-                                             serializedState, size, FMUState));
+    return fmi3_status(fmi_snapshot_deserialize(instance, CALL_fmi3DeserializeFMUState,
+                                                serializedState, size, FMUState));
 }
 
 /* ---- Derivatives with respect to other variables -------------------------------------------- */

@@ -1,4 +1,4 @@
-#include "fmu_state.h"
+#include "fmi_snapshot.h"
 
 #include "serialization.h"
 #include "snapshot.h"
@@ -65,26 +65,26 @@ static enum component_status refuse_kind(struct component *component, unsigned c
         component->adapter->rules[call].name, component_kind_name(component->kind));
 }
 
-enum component_status fmu_state_save(struct component *component, unsigned call, void **fmu_state) {
-    struct instance *instance = component_enter_with(component, call, 1, fmu_state, fmu_state);
+enum component_status fmi_snapshot_save(struct component *component, unsigned call, void **handle) {
+    struct instance *instance = component_enter_with(component, call, 1, handle, handle);
     if (instance == NULL) {
         return COMPONENT_ERROR;
     }
-    struct instance_snapshot *snapshot = *fmu_state;
+    struct instance_snapshot *snapshot = *handle;
     const enum status status = instance_save(instance, tag_of(component), &snapshot);
-    *fmu_state = snapshot;
+    *handle = snapshot;
     return component_result(component, status);
 }
 
-enum component_status fmu_state_restore(struct component *component, unsigned call,
-                                        void *fmu_state) {
-    struct instance *instance = component_enter_with(component, call, 1, fmu_state, fmu_state);
+enum component_status fmi_snapshot_restore(struct component *component, unsigned call,
+                                           void *handle) {
+    struct instance *instance = component_enter_with(component, call, 1, handle, handle);
     if (instance == NULL) {
         return COMPONENT_ERROR;
     }
     unsigned tag = 0;
     enum phase phase = PHASE_COUNT;
-    enum status status = instance_snapshot_tag(instance, fmu_state, &tag, &phase);
+    enum status status = instance_snapshot_tag(instance, handle, &tag, &phase);
     if (status != STATUS_OK) {
         return component_result(component, status);
     }
@@ -92,55 +92,55 @@ enum component_status fmu_state_restore(struct component *component, unsigned ca
     if (state == 0) {
         return refuse_kind(component, call, tag);
     }
-    status = instance_restore(instance, fmu_state);
+    status = instance_restore(instance, handle);
     if (status == STATUS_OK) {
         component->state = (enum fmi_state)state;
     }
     return component_result(component, status);
 }
 
-enum component_status fmu_state_free(struct component *component, unsigned call, void **fmu_state) {
+enum component_status fmi_snapshot_free(struct component *component, unsigned call, void **handle) {
     struct instance *instance = component_enter(component, call);
     if (instance == NULL) {
         return COMPONENT_ERROR;
     }
-    if (fmu_state == NULL || *fmu_state == NULL) {
+    if (handle == NULL || *handle == NULL) {
         return COMPONENT_OK;
     }
-    struct instance_snapshot *snapshot = *fmu_state;
+    struct instance_snapshot *snapshot = *handle;
     const enum status status = instance_forget(instance, &snapshot);
-    *fmu_state = snapshot;
+    *handle = snapshot;
     return component_result(component, status);
 }
 
-enum component_status fmu_state_size(struct component *component, unsigned call, void *fmu_state,
-                                     size_t *size) {
-    struct instance *instance = component_enter_with(component, call, 1, fmu_state, size);
+enum component_status fmi_snapshot_size(struct component *component, unsigned call, void *handle,
+                                        size_t *size) {
+    struct instance *instance = component_enter_with(component, call, 1, handle, size);
     if (instance == NULL) {
         return COMPONENT_ERROR;
     }
     unsigned tag = 0;
     enum phase phase = PHASE_COUNT;
-    const enum status status = instance_snapshot_tag(instance, fmu_state, &tag, &phase);
+    const enum status status = instance_snapshot_tag(instance, handle, &tag, &phase);
     if (status == STATUS_OK) {
         *size = instance_serialized_size(instance);
     }
     return component_result(component, status);
 }
 
-enum component_status fmu_state_serialize(struct component *component, unsigned call,
-                                          void *fmu_state, unsigned char bytes[], size_t size) {
-    struct instance *instance = component_enter_with(component, call, 1, fmu_state, bytes);
+enum component_status fmi_snapshot_serialize(struct component *component, unsigned call,
+                                             void *handle, unsigned char bytes[], size_t size) {
+    struct instance *instance = component_enter_with(component, call, 1, handle, bytes);
     if (instance == NULL) {
         return COMPONENT_ERROR;
     }
-    return component_result(component, instance_serialize(instance, fmu_state, bytes, size));
+    return component_result(component, instance_serialize(instance, handle, bytes, size));
 }
 
-enum component_status fmu_state_deserialize(struct component *component, unsigned call,
-                                            const unsigned char bytes[], size_t size,
-                                            void **fmu_state) {
-    struct instance *instance = component_enter_with(component, call, 1, bytes, fmu_state);
+enum component_status fmi_snapshot_deserialize(struct component *component, unsigned call,
+                                               const unsigned char bytes[], size_t size,
+                                               void **handle) {
+    struct instance *instance = component_enter_with(component, call, 1, bytes, handle);
     if (instance == NULL) {
         return COMPONENT_ERROR;
     }
@@ -156,6 +156,6 @@ enum component_status fmu_state_deserialize(struct component *component, unsigne
         instance_forget(instance, &snapshot);
         return refuse_kind(component, call, tag);
     }
-    *fmu_state = snapshot;
+    *handle = snapshot;
     return COMPONENT_OK;
 }
