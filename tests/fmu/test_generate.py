@@ -175,7 +175,7 @@ def compile_table(folder: Path, model: str) -> None:
             "src/model",
             "src/integrator",
             "src/instance",
-            "fmu/component",
+            "fmu/fmi",
             "models",
             model,
         )
