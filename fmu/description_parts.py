@@ -10,7 +10,7 @@ from declaration.schema import (
     Experiment,
     Float64,
     Model,
-    Unit,
+    UnitEntry,
     Variable,
 )
 from program import Provenance
@@ -40,7 +40,7 @@ def texts_of(declaration: Declaration, provenance: Provenance) -> dict[str, str]
     return {"description": model.description, **given}
 
 
-def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
+def add_units(root: ET.Element, units: dict[str, UnitEntry]) -> None:
     """Write UnitDefinitions: SI base exponents, and the display units."""
     definitions = ET.SubElement(root, "UnitDefinitions")
     for name, unit in sorted(units.items()):
@@ -54,7 +54,7 @@ def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
             ET.SubElement(element, "DisplayUnit", keys)
 
 
-def display_unit(variable: Float64, units: dict[str, Unit]) -> dict[str, str]:
+def display_unit(variable: Float64, units: dict[str, UnitEntry]) -> dict[str, str]:
     """Return the attribute for the display unit of a variable, if it has one."""
     if variable.display:
         return {"displayUnit": variable.display.name}

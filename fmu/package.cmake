@@ -31,7 +31,7 @@ set(fmi3_below fmi3/)
 set(fmi3_icon terminalsAndIcons/icon.png)
 set(fmi3_has_terminals ON)
 
-file(GLOB FMU_SHARED_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/component/*.c)
+file(GLOB FMU_SHARED_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/fmi/*.c)
 foreach(version IN LISTS FMI_VERSIONS)
   file(GLOB ${version}_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/${version}/*.c)
 endforeach()
@@ -129,7 +129,7 @@ function(add_fmu name)
   endif()
 
   # tables and model descriptions, again whenever a declaration changes
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/declaration/*.toml ${FMU_SOURCE_DIR}/fmi*/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/compiler/units.py ${FMU_SOURCE_DIR}/fmi*/*.py)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/program.py)
   set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${variables}
                --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
@@ -153,7 +153,7 @@ function(add_fmu name)
 
   # the description: the model with its table of variables, run by the instance
   add_library(${name}_description STATIC ${out}/variables.c)
-  target_include_directories(${name}_description PUBLIC ${FMU_SOURCE_DIR}/component)
+  target_include_directories(${name}_description PUBLIC ${FMU_SOURCE_DIR}/fmi)
   target_link_libraries(${name}_description PUBLIC instance ${ARG_LIBRARY} ${name}_interface)
 
   # the page inside the FMU

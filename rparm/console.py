@@ -128,7 +128,7 @@ def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
     return textwrap.shorten(whole, max(width(), len(text)), placeholder=" ...")
 
 
-class Table:
+class PrintedTable:
     """Rows under a head, each printed when it is known.
 
     `names`, of all rows to come, set the width of the first column, which is cut if it has no room.

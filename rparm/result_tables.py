@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from rparm import console
-from rparm.console import Table
+from rparm.console import PrintedTable
 from rparm.report.overview import Entry
 from rparm.runs.comparison import TIGHTEST, Failure, Run, Sweep, comparisons
 from rparm.runs.convergence import Convergence
@@ -29,7 +29,7 @@ class RunTable:
             columns[f"error at {short(TIGHTEST)}"] = 8
         self._with_tight = with_tight
         result = len(DONE) if not with_tight else len(verdict(True))
-        self._table = Table("scenario", names, {**columns, "time": 7}, result=result)
+        self._table = PrintedTable("scenario", names, {**columns, "time": 7}, result=result)
 
     def row(
         self, name: str, tolerance: float, runs: Sequence[Run], failures: Iterable[str]
@@ -64,7 +64,7 @@ class SweepTable:
     def __init__(self, names: Iterable[str], tolerances: Iterable[float]) -> None:
         print()
         columns = {short(tolerance): 5 for tolerance in tolerances}
-        self._table = Table("error at tolerance", names, columns, gap=1, result=0)
+        self._table = PrintedTable("error at tolerance", names, columns, gap=1, result=0)
 
     def row(self, sweep: Sweep) -> None:
         self._table.row(sweep.scenario.name, [short(error, 0) for error in sweep.errors])
@@ -79,7 +79,7 @@ class FederationTable:
         columns = {"steps": 6, "difference": 10}
         times = dict.fromkeys(("HELICS us/step", "Ecos us/step", "master us/step"), 7)
         self._bound = bound
-        self._table = Table("variant", names, columns | times)
+        self._table = PrintedTable("variant", names, columns | times)
 
     def row(
         self, name: str, steps: int, difference: float, times: Sequence[float], passed: bool
@@ -101,7 +101,7 @@ class VariantTable:
         columns = {error: max(7, *map(len, error.split()))}
         columns |= {m.name: max(9, *map(len, m.name.split())) for m in measures}
         result = len(verdict(True) if error == "error" else DONE)
-        self._table = Table("variant", names, {**columns, "time": 7}, result=result)
+        self._table = PrintedTable("variant", names, {**columns, "time": 7}, result=result)
 
     def row(self, outcome: Outcome) -> None:
         measured = (f"{_seven_digits(m.value(outcome))} {m.unit}" for m in self._measures)
@@ -130,7 +130,7 @@ def print_convergence(study: Convergence) -> None:
     steps = [duration(step) for step in study.problem.steps]
     columns = {step: max(5, len(step)) for step in steps}
     names = [row.name for row in study.rows]
-    table = Table(study.scenario.name, names, {**columns, "slope": 5}, gap=1)
+    table = PrintedTable(study.scenario.name, names, {**columns, "slope": 5}, gap=1)
     for row in study.rows:
         cells = [*(short(error, 0) for error in row.errors), f"{row.slope:.2f}"]
         table.row(row.name, cells, verdict(row.holds))

@@ -2,7 +2,6 @@
 
 Users may write "90 deg", "300 mm" or "2kN". Known for a variable are its own unit, the display
 units that its FMU declares for it, and what the compiler knows of the same dimension.
-Conversions are exact and rounded once; degrees are converted as by `math.radians`.
 """
 
 import math
@@ -17,7 +16,7 @@ from typing import Any
 from rparm.errors import WrongValueError, did_you_mean
 from rparm.files import show
 from rparm.fmu_tools.compiler.expressions import expression
-from rparm.fmu_tools.compiler.expressions.units import measured
+from rparm.fmu_tools.compiler.units import Unit, parsed
 
 USUAL = {  # units that messages name
     "m": "mm cm km", "s": "ms us min h", "rad": "deg mrad", "Hz": "mHz kHz", "kg": "g t",
@@ -25,9 +24,6 @@ USUAL = {  # units that messages name
     "K": "degC mK", "degC": "K", "Pa": "kPa bar",
 }  # fmt: skip
 NONE = (None, "", "1")  # units of variables without one
-ANGLE = "rad"
-DEGREE = Fraction(180 / math.pi)  # degrees of a radian
-SAME = Fraction(1, 10**12)  # FMUs write as many digits of it as they like
 LONGEST = 100  # characters of a value with its unit
 MOST_SHOWN = 20  # units in a message
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -36,23 +32,6 @@ TYPED = str.maketrans({"·": ".", "²": "2", "³": "3"})  # as pages write units
 PREFIXABLE = re.compile(r"(m|s|rad|N|J|W|V|A|Hz|Pa|H)(?!\w)")
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}  # s
 SMALLEST = 1e-99  # smaller numbers are shown as ~0
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit by number = factor * value + offset, as FMI defines display units."""
-
-    factor: Fraction = Fraction(1)
-    offset: Fraction = Fraction(0)
-
-    def value(self, number: str, is_difference: bool = False) -> float:
-        """Return the value of a `number`, a finite literal; a difference of two has no offset."""
-        if not self.offset and abs(self.factor - DEGREE) <= SAME * DEGREE:
-            return math.radians(float(number))
-        # here only 0 can have an exponent of any size: others have been refused
-        exact = Fraction(number) if float(number) else Fraction(0)
-        exact = (exact if is_difference else exact - self.offset) / self.factor
-        return float(exact) if exact else math.copysign(0.0, float(number))
 
 
 @dataclass(frozen=True)
@@ -73,35 +52,31 @@ Displays = Mapping[str, Units]  # display units, by the unit that they belong to
 
 
 def display_unit(factor: object, offset: object) -> Unit:
-    """Return the unit that an FMU declares; ValueError if its numbers are of no use."""
+    """Return the unit that an FMU declares: a number is factor * value + offset in it.
+
+    ValueError if these are of no use.
+    """
     numbers = [float(str(number)) for number in (factor, offset)]
     if not all(map(math.isfinite, numbers)) or not numbers[0]:
         raise ValueError(f"display unit with factor {factor} and offset {offset}")
-    return Unit(*(Fraction(repr(number)) for number in numbers))
+    exact, below = (Fraction(repr(number)) for number in numbers)
+    return Unit({}, 1 / exact, -below / exact)
 
 
 def units_of(name: str | None, displays: Displays) -> Units:
     """Return the units that messages name, for a value whose own unit is `name`; empty for none."""
     if name in NONE:
         return {}
-    known = {name: Unit()} | dict(displays.get(name, {}))
+    known = {name: Unit({})} | dict(displays.get(name, {}))
     for other in USUAL.get(name, "").split():
-        known.setdefault(other, _measured(other, name))
+        known.setdefault(other, parsed(other).of(parsed(name)))
     return known
-
-
-def _measured(name: str, own: str) -> Unit:
-    """Return a unit of what `own` measures, too; ValueError if it is none."""
-    other, of_own = measured(name), measured(own)
-    if other.exponents != of_own.exponents:
-        raise ValueError(f"{name} measures something else than {own}")
-    return Unit(of_own.factor / other.factor, (of_own.offset - other.offset) / other.factor)
 
 
 # units of other values in scenarios and campaigns than variables of models
 SECONDS = units_of("s", {})
 HERTZ = units_of("Hz", {})
-RADIANS = units_of(ANGLE, {ANGLE: {"deg": Unit(DEGREE)}})
+RADIANS = units_of("rad", {})
 
 
 def finite_number(given: Any) -> float:
@@ -150,7 +125,7 @@ def _parts(text: str, known: Units) -> tuple[str, str]:
 
 
 def _value(given: str, number: str, name: str, known: Units, is_difference: bool = False) -> float:
-    unit = _unit(name, known) if name else Unit()
+    unit = _unit(name, known) if name else Unit({})
     if unit is None:
         guess = did_you_mean(name, known)
         raise WrongValueError(f"unknown unit {show(name)}{guess}{_known(known)}")
@@ -165,7 +140,7 @@ def _unit(name: str, known: Units) -> Unit | None:
     if name in known:
         return known[name]
     with suppress(ValueError):
-        unit = _measured(name, next(iter(known)))
+        unit = parsed(name).of(parsed(next(iter(known))))
         return unit if not unit.offset else None
     return None
 

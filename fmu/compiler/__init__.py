@@ -2,7 +2,8 @@
 
 A folder or module imports only from lines above its own:
 
-    expressions   what users write, and units
+    units         symbols of units, and what numbers with them are in SI
+    expressions   what users write, and its dimensions
     graph         operations on values and conditions, and their derivatives; tables
     names         names in C of the variables of a file
     plain_c       interprets functions in plain C, as values of a graph

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from .expressions.expression import LONGEST
-from .expressions.units import ANGLE, BASE
 from .graph.tables import INTERPOLATIONS, OUTSIDE
 from .read import keys as reader
 from .read.arrays import FOR
 from .read.content import BOOLEAN, FOLLOWS, INTEGER, SWITCHES
 from .read.header import CALCULATED
 from .read.include import INCLUDED
+from .units import ANGLE, BASE
 from .write import declaration
 
 Schema = dict[str, Any]

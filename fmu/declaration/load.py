@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from compiler.units import DISPLAYED, STANDARD, parsed
 from program import WrongInputError
 from pydantic import ValidationError
 
 from declaration import schema
 
 LONGEST_SHOWN = 60  # characters of a value in a message
-UNITS = Path(__file__).with_name("units.toml")  # of all models
 
 
 class DeclarationError(WrongInputError):
@@ -94,7 +94,7 @@ def first_mistake(error: ValidationError) -> str:
     return ": ".join([*words, reason(mistake, table, key)])
 
 
-def place_of(location: list[str | int]) -> tuple[list[str], type[schema.Table], str]:
+def place_of(location: list[str | int]) -> tuple[list[str], type[schema.TomlTable], str]:
     """Return words for a table of the file, its class, and the path of the value within it."""
     match location:
         case ["model", *keys]:
@@ -106,7 +106,7 @@ def place_of(location: list[str | int]) -> tuple[list[str], type[schema.Table], 
         case ["changes", name, *keys]:
             words, table = [f"change {name}"], schema.Change
         case ["units", name, *keys]:
-            words, table = [f"unit {name}"], schema.Unit
+            words, table = [f"unit {name}"], schema.UnitEntry
         case ["variables", name, kind, "items", item, *keys] if kind in schema.TYPES:
             words, table = [f"variable {name}", f"item {item}"], schema.Item
         case ["variables", name, kind, *keys] if kind in schema.TYPES:
@@ -123,7 +123,7 @@ def place_of(location: list[str | int]) -> tuple[list[str], type[schema.Table], 
     return words, table, path.removeprefix(".")
 
 
-def reason(mistake: Any, table: type[schema.Table], key: str) -> str:
+def reason(mistake: Any, table: type[schema.TomlTable], key: str) -> str:
     """Say why the value of a key is wrong, or why the table is, if `key` is empty."""
     context = mistake.get("ctx", {})
     subject = f"{key} = {shown(mistake['input'])} " if key else ""
@@ -147,7 +147,7 @@ def reason(mistake: Any, table: type[schema.Table], key: str) -> str:
     return subject + mistake["msg"].removeprefix("Input ")
 
 
-def keys_of(table: type[schema.Table]) -> list[str]:
+def keys_of(table: type[schema.TomlTable]) -> list[str]:
     return [field.alias or name for name, field in table.model_fields.items()]
 
 
@@ -167,7 +167,7 @@ class Declaration:
     path: Path  # of its variables.toml
     model: schema.Model
     experiment: schema.Experiment
-    units: dict[str, schema.Unit]
+    units: dict[str, schema.UnitEntry]
     variables: dict[str, schema.Variable]
     terminals: dict[str, schema.Terminal]
 
@@ -200,7 +200,7 @@ def load(path: Path) -> Declaration:
 
 def assemble(path: Path, file: schema.File) -> Declaration:
     """Read all that a file, which is or could be at this path, declares with its includes."""
-    units = dict(read(UNITS).units)
+    units = {name: _standard_unit(name) for name in STANDARD}
     variables: dict[str, schema.Variable] = {}
     places: dict[str, str] = {}
     for source, part in files_of(path, file):
@@ -233,6 +233,11 @@ def assemble(path: Path, file: schema.File) -> Declaration:
     return Declaration(path, file.model, file.experiment, used, dict(by_reference), file.terminals)
 
 
+def _standard_unit(name: str) -> schema.UnitEntry:
+    shown = {other: float(1 / parsed(other).factor) for other in DISPLAYED.get(name, ())}
+    return schema.UnitEntry(**parsed(name).exponents, display=shown)
+
+
 def check_references(variables: dict[str, schema.Variable], places: dict[str, str]) -> None:
     """Check that value references are unique, and that there is one independent variable."""
     owners: dict[int, str] = {}
@@ -248,13 +253,15 @@ def check_references(variables: dict[str, schema.Variable], places: dict[str, st
 
 
 def check_names(
-    variables: dict[str, schema.Variable], units: dict[str, schema.Unit], places: dict[str, str]
+    variables: dict[str, schema.Variable],
+    units: dict[str, schema.UnitEntry],
+    places: dict[str, str],
 ) -> None:
     """Check that units and variables that are referred to are declared."""
     for name, variable in variables.items():
         if isinstance(variable, schema.Float64) and variable.unit not in units:
-            where = f"neither in {UNITS.name} nor among [units]"
-            raise DeclarationError(f"{places[name]}: unit '{variable.unit}' is {where}")
+            where = f"{places[name]}: unit '{variable.unit}'"
+            raise DeclarationError(f"{where} is neither a standard one nor among [units]")
         listed = [*(variable.dependencies or []), *variable.parameters, *(variable.initially or [])]
         listed += [variable.derivative_of] if variable.derivative_of is not None else []
         for other in listed:

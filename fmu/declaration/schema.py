@@ -15,7 +15,8 @@ include       further files, relative to this one, whose [variables] and [units]
               time_events (true: the model has time events), naming ("structured": names have
               indexes)
 [experiment]  start, stop, tolerance, step: the default experiment
-[units]       "name" = { exponents of the SI base units, display.NAME = factor }, beside units.toml
+[units]       "name" = { exponents of the SI base units, display.NAME = factor }, beside those of
+              STANDARD in compiler/units.py
 [variables.NAME]
     reference     value reference, unique, 0 to 99999
     owner         "model" (default) or "instance": the structure that holds the value
@@ -111,13 +112,13 @@ VariableName = Annotated[str, AfterValidator(variable_name)]
 Int32Value = Annotated[int, Field(ge=-(2**31), le=2**31 - 1)]
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """A table without unknown keys, whose values have the declared types and are finite."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
 
-class Model(Table):
+class Model(TomlTable):
     name: Identifier
     description: str
     header: str
@@ -136,7 +137,7 @@ class Model(Table):
         return bool(self.event_indicators) or self.time_events
 
 
-class Experiment(Table):
+class Experiment(TomlTable):
     """The default experiment, times in s."""
 
     start: float
@@ -154,7 +155,7 @@ class Experiment(Table):
         return self
 
 
-class Display(Table):
+class Display(TomlTable):
     """A display unit, in which a value is factor * value + offset."""
 
     name: str
@@ -162,7 +163,7 @@ class Display(Table):
     offset: float = 0.0
 
 
-class Unit(Table):
+class UnitEntry(TomlTable):
     """Exponents of the SI base units, and factors of the display units."""
 
     kg: int = 0
@@ -182,12 +183,12 @@ class Unit(Table):
         return self.model_dump(exclude={"display", "further"}, exclude_defaults=True)
 
 
-class Item(Table):
+class Item(TomlTable):
     constant: Identifier | None = None
     description: str
 
 
-class Variable(Table):
+class Variable(TomlTable):
     """What variables of all types have; each type adds start, min and max as numbers or None."""
 
     reference: int = Field(ge=0, le=99999)
@@ -358,7 +359,7 @@ AnyVariable = Annotated[
 ]
 
 
-class Terminal(Table):
+class Terminal(TomlTable):
     """Variables that are connected together, by member, and terminals within."""
 
     rule: Literal["plug", "bus", "none"]
@@ -386,7 +387,7 @@ class Terminal(Table):
         return self
 
 
-class Include(Table):
+class Include(TomlTable):
     """Variables of another file that count here, too."""
 
     file: str
@@ -401,7 +402,7 @@ class Include(Table):
         return {"file": value} if isinstance(value, str) else value
 
 
-class Change(Table):
+class Change(TomlTable):
     """Changes of a variable that another file declares."""
 
     description: str = ""
@@ -411,13 +412,13 @@ class Change(Table):
     more_parameters: list[str] = []
 
 
-class File(Table):
+class File(TomlTable):
     """One file: a variables.toml, or what it includes."""
 
     include: list[Include] = []
     changes: dict[VariableName, Change] = {}
     model: Model | None = None
     experiment: Experiment | None = None
-    units: dict[str, Unit] = {}
+    units: dict[str, UnitEntry] = {}
     variables: dict[VariableName, AnyVariable] = {}
     terminals: dict[Identifier, Terminal] = {}

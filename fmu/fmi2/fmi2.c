@@ -4,7 +4,7 @@
 #include "derivatives.h"
 #include "fmi2Functions.h"
 #include "fmi2_functions.h"
-#include "fmu_state.h"
+#include "fmi_snapshot.h"
 #include "model_description.h"
 #include "stepping.h"
 #include "values.h"
@@ -42,25 +42,25 @@ static const struct call_rule fmi2_call_rules[FMI2_CALL_COUNT] = {
 /* ---- Component ------------------------------------------------------------------------------ */
 
 /* The structure that an fmi2Component points to. */
-struct fmi2_component {
-    struct component base;     /* first */
+struct fmi2_instance {
+    struct fmi_instance base;  /* first */
     fmi2CallbackLogger logger; /* NULL for no log */
     fmi2ComponentEnvironment environment;
     const char *name;
 };
 
-_Static_assert((int)COMPONENT_OK == fmi2OK && (int)COMPONENT_WARNING == fmi2Warning &&
-                   (int)COMPONENT_DISCARD == fmi2Discard && (int)COMPONENT_ERROR == fmi2Error &&
-                   (int)COMPONENT_FATAL == fmi2Fatal,
-               "a component_status is converted by a cast");
+_Static_assert((int)FMI_OK == fmi2OK && (int)FMI_WARNING == fmi2Warning &&
+                   (int)FMI_DISCARD == fmi2Discard && (int)FMI_ERROR == fmi2Error &&
+                   (int)FMI_FATAL == fmi2Fatal,
+               "a fmi_status is converted by a cast");
 
-static fmi2Status fmi2_status(enum component_status status) {
+static fmi2Status fmi2_status(enum fmi_status status) {
     return (fmi2Status)status;
 }
 
 /* Converts a status of the instance. */
-static fmi2Status result(struct component *component, enum status status) {
-    return fmi2_status(component_result(component, status));
+static fmi2Status result(struct fmi_instance *fmi, enum status status) {
+    return fmi2_status(fmi_result(fmi, status));
 }
 
 /* ---- Versions, life and logging ------------------------------------------------------------- */
@@ -73,9 +73,9 @@ const char *fmi2GetVersion(void) {
     return fmi2Version;
 }
 
-static void send_text(const struct component *component, enum component_status status,
-                      const char *category, const char *text) {
-    const struct fmi2_component *to = (const struct fmi2_component *)component;
+static void send_text(const struct fmi_instance *fmi, enum fmi_status status, const char *category,
+                      const char *text) {
+    const struct fmi2_instance *to = (const struct fmi2_instance *)fmi;
     if (to->logger != NULL) {
         to->logger(to->environment, to->name, fmi2_status(status), category, text);
     }
@@ -99,44 +99,43 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (functions == NULL) {
         return NULL;
     }
-    struct fmi2_component component = {.logger = functions->logger,
-                                       .environment = functions->componentEnvironment,
-                                       .name = instanceName != NULL ? instanceName : ""};
+    struct fmi2_instance fmi = {.logger = functions->logger,
+                                .environment = functions->componentEnvironment,
+                                .name = instanceName != NULL ? instanceName : ""};
     const enum fmi_kind kind =
         fmuType == fmi2CoSimulation ? KIND_CO_SIMULATION : KIND_MODEL_EXCHANGE;
-    component_begin(&component.base, &adapter, kind, loggingOn != fmi2False);
-    if (!component_check_token(&component.base, instanceName, "GUID", fmuGUID,
-                               model_description.guid)) {
+    fmi_begin(&fmi.base, &adapter, kind, loggingOn != fmi2False);
+    if (!fmi_check_token(&fmi.base, instanceName, "GUID", fmuGUID, model_description.guid)) {
         return NULL;
     }
     if (fmuType != fmi2CoSimulation && fmuType != fmi2ModelExchange) {
-        component_fail(&component.base,
-                       "FMU type %d is refused: %d for Model Exchange or %d for Co-Simulation is "
-                       "expected",
-                       (int)fmuType, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
+        fmi_fail(&fmi.base,
+                 "FMU type %d is refused: %d for Model Exchange or %d for Co-Simulation is "
+                 "expected",
+                 (int)fmuType, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
         return NULL;
     }
-    // the name behind the component
-    const size_t name_size = strlen(component.name) + 1;
-    struct fmi2_component *created = malloc(sizeof *created + name_size);
+    // the name behind the FMI instance
+    const size_t name_size = strlen(fmi.name) + 1;
+    struct fmi2_instance *created = malloc(sizeof *created + name_size);
     if (created == NULL) {
-        component_fail(&component.base, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        fmi_fail(&fmi.base, "%s", status_text(STATUS_OUT_OF_MEMORY));
         return NULL;
     }
-    *created = component;
-    created->name = memcpy(created + 1, component.name, name_size);
-    if (component_create_instance(&created->base) != COMPONENT_OK) {
+    *created = fmi;
+    created->name = memcpy(created + 1, fmi.name, name_size);
+    if (fmi_create_instance(&created->base) != FMI_OK) {
         free(created);
         return NULL;
     }
-    component_log(&created->base, COMPONENT_OK, LOG_ALL, "fmi2Instantiate");
+    fmi_log(&created->base, FMI_OK, LOG_ALL, "fmi2Instantiate");
     return created;
 }
 
 void fmi2FreeInstance(fmi2Component c) {
-    if (c != NULL && !component_refuse_in_logger(c, "fmi2FreeInstance")) {
-        component_log(c, COMPONENT_OK, LOG_ALL, "fmi2FreeInstance");
-        component_end(c);
+    if (c != NULL && !fmi_refuse_in_logger(c, "fmi2FreeInstance")) {
+        fmi_log(c, FMI_OK, LOG_ALL, "fmi2FreeInstance");
+        fmi_end(c);
         free(c);
     }
 }
@@ -144,10 +143,10 @@ void fmi2FreeInstance(fmi2Component c) {
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
     const enum fmi2_call call = CALL_fmi2SetDebugLogging;
-    if (component_enter_with(c, call, nCategories, categories, categories) == NULL) {
+    if (fmi_enter_with(c, call, nCategories, categories, categories) == NULL) {
         return fmi2Error;
     }
-    return fmi2_status(component_set_logging(c, loggingOn != fmi2False, nCategories, categories));
+    return fmi2_status(fmi_set_logging(c, loggingOn != fmi2False, nCategories, categories));
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
@@ -159,28 +158,28 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
         .tolerance_defined = toleranceDefined != fmi2False,
         .tolerance = tolerance,
     };
-    struct instance *instance = component_enter(c, CALL_fmi2SetupExperiment);
+    struct instance *instance = fmi_enter(c, CALL_fmi2SetupExperiment);
     return instance != NULL ? result(c, instance_setup_experiment(instance, &experiment))
                             : fmi2Error;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-    struct instance *instance = component_enter(c, CALL_fmi2EnterInitializationMode);
-    return instance != NULL ? fmi2_status(component_go_to(c, STATE_INITIALIZATION,
-                                                          instance_enter_initialization(instance)))
+    struct instance *instance = fmi_enter(c, CALL_fmi2EnterInitializationMode);
+    return instance != NULL ? fmi2_status(fmi_go_to(c, STATE_INITIALIZATION,
+                                                    instance_enter_initialization(instance)))
                             : fmi2Error;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    return fmi2_status(component_exit_initialization(c, CALL_fmi2ExitInitializationMode));
+    return fmi2_status(fmi_exit_initialization(c, CALL_fmi2ExitInitializationMode));
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-    return fmi2_status(component_terminate(c, CALL_fmi2Terminate));
+    return fmi2_status(fmi_terminate(c, CALL_fmi2Terminate));
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
-    return fmi2_status(component_reset(c, CALL_fmi2Reset));
+    return fmi2_status(fmi_reset(c, CALL_fmi2Reset));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -188,8 +187,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
 #define ACCESS(Verb, verb, Type, type, element)                                                    \
     fmi2Status fmi2##Verb##Type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,        \
                                 element value[]) {                                                 \
-        struct instance *instance =                                                                \
-            component_enter_with(c, CALL_fmi2##Verb##Type, nvr, vr, value);                        \
+        struct instance *instance = fmi_enter_with(c, CALL_fmi2##Verb##Type, nvr, vr, value);      \
         return instance != NULL ? result(c, instance_##verb##_##type(instance, vr, nvr, value))    \
                                 : fmi2Error;                                                       \
     }
@@ -203,8 +201,8 @@ ACCESS(Set, set, Boolean, boolean, const fmi2Boolean)
 /* Accesses a type that no variable has. */
 static fmi2Status access_none(fmi2Component c, enum fmi2_call call, const fmi2ValueReference vr[],
                               size_t nvr, const void *value) {
-    return component_enter_with(c, call, nvr, vr, value) != NULL
-               ? fmi2_status(component_access_none(c, "String", vr, nvr))
+    return fmi_enter_with(c, call, nvr, vr, value) != NULL
+               ? fmi2_status(fmi_access_none(c, "String", vr, nvr))
                : fmi2Error;
 }
 
@@ -221,30 +219,30 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 /* ---- FMU state ------------------------------------------------------------------------------ */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    return fmi2_status(fmu_state_save(c, CALL_fmi2GetFMUstate, FMUstate));
+    return fmi2_status(fmi_snapshot_save(c, CALL_fmi2GetFMUstate, FMUstate));
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-    return fmi2_status(fmu_state_restore(c, CALL_fmi2SetFMUstate, FMUstate));
+    return fmi2_status(fmi_snapshot_restore(c, CALL_fmi2SetFMUstate, FMUstate));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    return fmi2_status(fmu_state_free(c, CALL_fmi2FreeFMUstate, FMUstate));
+    return fmi2_status(fmi_snapshot_free(c, CALL_fmi2FreeFMUstate, FMUstate));
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
-    return fmi2_status(fmu_state_size(c, CALL_fmi2SerializedFMUstateSize, FMUstate, size));
+    return fmi2_status(fmi_snapshot_size(c, CALL_fmi2SerializedFMUstateSize, FMUstate, size));
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
                                  size_t size) {
-    return fmi2_status(fmu_state_serialize(c, CALL_fmi2SerializeFMUstate, FMUstate,
-                                           (unsigned char *)serializedState, size));
+    return fmi2_status(fmi_snapshot_serialize(c, CALL_fmi2SerializeFMUstate, FMUstate,
+                                              (unsigned char *)serializedState, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate *FMUstate) {
-    return fmi2_status(fmu_state_deserialize(
+    return fmi2_status(fmi_snapshot_deserialize(
         c, CALL_fmi2DeSerializeFMUstate, (const unsigned char *)serializedState, size, FMUstate));
 }
 
@@ -255,8 +253,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
     const enum fmi2_call call = CALL_fmi2GetDirectionalDerivative;
-    struct instance *instance = component_enter_with(c, call, nUnknown, vUnknown_ref, dvUnknown);
-    if (instance == NULL || !component_check_arrays(c, call, nKnown, vKnown_ref, dvKnown)) {
+    struct instance *instance = fmi_enter_with(c, call, nUnknown, vUnknown_ref, dvUnknown);
+    if (instance == NULL || !fmi_check_arrays(c, call, nKnown, vKnown_ref, dvKnown)) {
         return fmi2Error;
     }
     return result(c, instance_get_directional_derivative(instance, KNOWN_MOTION, vUnknown_ref,
@@ -267,17 +265,17 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 /* ---- Model Exchange: modes (section 3.2) ---------------------------------------------------- */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
-    struct instance *instance = component_enter(c, CALL_fmi2EnterEventMode);
+    struct instance *instance = fmi_enter(c, CALL_fmi2EnterEventMode);
     if (instance == NULL) {
         return fmi2Error;
     }
     instance_enter_event_mode(instance);
-    return fmi2_status(component_go_to(c, STATE_EVENT, STATUS_OK));
+    return fmi2_status(fmi_go_to(c, STATE_EVENT, STATUS_OK));
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) {
     struct instance *instance =
-        component_enter_with(c, CALL_fmi2NewDiscreteStates, 1, fmi2eventInfo, fmi2eventInfo);
+        fmi_enter_with(c, CALL_fmi2NewDiscreteStates, 1, fmi2eventInfo, fmi2eventInfo);
     if (instance == NULL) {
         return fmi2Error;
     }
@@ -296,9 +294,9 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-    struct instance *instance = component_enter(c, CALL_fmi2EnterContinuousTimeMode);
-    return instance != NULL ? fmi2_status(component_go_to(c, STATE_CONTINUOUS_TIME,
-                                                          instance_enter_continuous_time(instance)))
+    struct instance *instance = fmi_enter(c, CALL_fmi2EnterContinuousTimeMode);
+    return instance != NULL ? fmi2_status(fmi_go_to(c, STATE_CONTINUOUS_TIME,
+                                                    instance_enter_continuous_time(instance)))
                             : fmi2Error;
 }
 
@@ -306,8 +304,8 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
                                        fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
-    struct instance *instance = component_enter_with(c, CALL_fmi2CompletedIntegratorStep, 1,
-                                                     enterEventMode, terminateSimulation);
+    struct instance *instance =
+        fmi_enter_with(c, CALL_fmi2CompletedIntegratorStep, 1, enterEventMode, terminateSimulation);
     if (instance == NULL) {
         return fmi2Error;
     }
@@ -319,37 +317,37 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
 /* ---- Model Exchange: time and states -------------------------------------------------------- */
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    struct instance *instance = component_enter(c, CALL_fmi2SetTime);
+    struct instance *instance = fmi_enter(c, CALL_fmi2SetTime);
     return instance != NULL ? result(c, instance_set_time(instance, time)) : fmi2Error;
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-    struct instance *instance = component_enter_with(c, CALL_fmi2SetContinuousStates, nx, x, x);
+    struct instance *instance = fmi_enter_with(c, CALL_fmi2SetContinuousStates, nx, x, x);
     return instance != NULL ? result(c, instance_set_states(instance, x, nx)) : fmi2Error;
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
     struct instance *instance =
-        component_enter_with(c, CALL_fmi2GetDerivatives, nx, derivatives, derivatives);
+        fmi_enter_with(c, CALL_fmi2GetDerivatives, nx, derivatives, derivatives);
     return instance != NULL ? result(c, instance_get_derivatives(instance, derivatives, nx))
                             : fmi2Error;
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
     struct instance *instance =
-        component_enter_with(c, CALL_fmi2GetEventIndicators, ni, eventIndicators, eventIndicators);
+        fmi_enter_with(c, CALL_fmi2GetEventIndicators, ni, eventIndicators, eventIndicators);
     return instance != NULL ? result(c, instance_get_indicators(instance, eventIndicators, ni))
                             : fmi2Error;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    struct instance *instance = component_enter_with(c, CALL_fmi2GetContinuousStates, nx, x, x);
+    struct instance *instance = fmi_enter_with(c, CALL_fmi2GetContinuousStates, nx, x, x);
     return instance != NULL ? result(c, instance_get_states(instance, x, nx)) : fmi2Error;
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
     struct instance *instance =
-        component_enter_with(c, CALL_fmi2GetNominalsOfContinuousStates, nx, x_nominal, x_nominal);
+        fmi_enter_with(c, CALL_fmi2GetNominalsOfContinuousStates, nx, x_nominal, x_nominal);
     return instance != NULL ? result(c, instance_get_nominals(instance, x_nominal, nx)) : fmi2Error;
 }
 
@@ -358,8 +356,8 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
     const enum fmi2_call call = CALL_fmi2SetRealInputDerivatives;
-    struct instance *instance = component_enter_with(c, call, nvr, vr, value);
-    return instance != NULL && component_check_arrays(c, call, nvr, order, order)
+    struct instance *instance = fmi_enter_with(c, call, nvr, vr, value);
+    return instance != NULL && fmi_check_arrays(c, call, nvr, order, order)
                ? result(c, instance_set_input_derivatives(instance, vr, nvr, order, value))
                : fmi2Error;
 }
@@ -367,8 +365,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
     const enum fmi2_call call = CALL_fmi2GetRealOutputDerivatives;
-    struct instance *instance = component_enter_with(c, call, nvr, vr, value);
-    return instance != NULL && component_check_arrays(c, call, nvr, order, order)
+    struct instance *instance = fmi_enter_with(c, call, nvr, vr, value);
+    return instance != NULL && fmi_check_arrays(c, call, nvr, order, order)
                ? result(c, instance_get_output_derivatives(instance, vr, nvr, order, value))
                : fmi2Error;
 }
@@ -379,8 +377,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     // importers say true, and roll back nevertheless
-    struct component *component = c;
-    struct instance *instance = component_enter(component, CALL_fmi2DoStep);
+    struct fmi_instance *fmi = c;
+    struct instance *instance = fmi_enter(fmi, CALL_fmi2DoStep);
     if (instance == NULL) {
         return fmi2Error;
     }
@@ -390,25 +388,24 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
         return fmi2OK;
     }
     if (status_severity(status) == SEVERITY_DISCARD) {
-        component->state = STATE_STEP_FAILED;
+        fmi->state = STATE_STEP_FAILED;
     }
-    return result(component, status);
+    return result(fmi, status);
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
     // no state allows it: no step is ever pending
-    return component_enter(c, CALL_fmi2CancelStep) != NULL ? fmi2OK : fmi2Error;
+    return fmi_enter(c, CALL_fmi2CancelStep) != NULL ? fmi2OK : fmi2Error;
 }
 
 /* ---- Co-Simulation: status ------------------------------------------------------------------ */
 
 static fmi2Status no_status(fmi2Component c, enum fmi2_call call, const void *value) {
-    if (component_enter_with(c, call, 1, value, value) == NULL) {
+    if (fmi_enter_with(c, call, 1, value, value) == NULL) {
         return fmi2Error;
     }
-    component_log(c, COMPONENT_DISCARD, LOG_STATUS_DISCARD,
-                  "%s: this status cannot be known, no step is ever pending",
-                  fmi2_call_rules[call].name);
+    fmi_log(c, FMI_DISCARD, LOG_STATUS_DISCARD,
+            "%s: this status cannot be known, no step is ever pending", fmi2_call_rules[call].name);
     return fmi2Discard;
 }
 
@@ -420,8 +417,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
     if (s != fmi2LastSuccessfulTime) {
         return no_status(c, CALL_fmi2GetRealStatus, value);
     }
-    const struct instance *instance =
-        component_enter_with(c, CALL_fmi2GetRealStatus, 1, value, value);
+    const struct instance *instance = fmi_enter_with(c, CALL_fmi2GetRealStatus, 1, value, value);
     if (instance == NULL) {
         return fmi2Error;
     }
@@ -437,7 +433,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
     if (s != fmi2Terminated) {
         return no_status(c, CALL_fmi2GetBooleanStatus, value);
     }
-    if (component_enter_with(c, CALL_fmi2GetBooleanStatus, 1, value, value) == NULL) {
+    if (fmi_enter_with(c, CALL_fmi2GetBooleanStatus, 1, value, value) == NULL) {
         return fmi2Error;
     }
     *value = fmi2False; // the FMU never ends a simulation by itself

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import description_parts
 from declaration.load import Declaration, DeclarationError
-from declaration.schema import Float64, Unit, Variable
+from declaration.schema import Float64, UnitEntry, Variable
 from program import Provenance
 
 TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration", "boolean": "Boolean"}
@@ -107,7 +107,7 @@ def add_variable(
     variable: Variable,
     type_name: str | None,
     index: dict[str, str],
-    units: dict[str, Unit],
+    units: dict[str, UnitEntry],
 ) -> None:
     keys = {"name": name, "valueReference": str(variable.reference)}
     for key in ("description", "causality", "variability", "initial"):

@@ -3,7 +3,7 @@
 #include "continuous_states.h"
 #include "derivatives.h"
 #include "fmi3_calls.h"
-#include "fmu_state.h"
+#include "fmi_snapshot.h"
 #include "model_description.h"
 #include "stepping.h"
 #include "values.h"
@@ -13,8 +13,8 @@
 #include <string.h>
 
 /* Converts a status of the instance. */
-static fmi3Status result(struct component *component, enum status status) {
-    return fmi3_status(component_result(component, status));
+static fmi3Status result(struct fmi_instance *fmi, enum status status) {
+    return fmi3_status(fmi_result(fmi, status));
 }
 
 /* ---- Version and logging -------------------------------------------------------------------- */
@@ -23,9 +23,9 @@ const char *fmi3GetVersion(void) {
     return fmi3Version;
 }
 
-static void send_text(const struct component *component, enum component_status status,
-                      const char *category, const char *text) {
-    const struct fmi3_component *to = (const struct fmi3_component *)component;
+static void send_text(const struct fmi_instance *fmi, enum fmi_status status, const char *category,
+                      const char *text) {
+    const struct fmi3_instance *to = (const struct fmi3_instance *)fmi;
     if (to->logger != NULL) {
         to->logger(to->environment, fmi3_status(status), category, text);
     }
@@ -47,11 +47,11 @@ static const struct adapter adapter = {
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[]) {
-    if (component_enter_with(instance, CALL_fmi3SetDebugLogging, nCategories, categories,
-                             categories) == NULL) {
+    if (fmi_enter_with(instance, CALL_fmi3SetDebugLogging, nCategories, categories, categories) ==
+        NULL) {
         return fmi3Error;
     }
-    return fmi3_status(component_set_logging(instance, loggingOn, nCategories, categories));
+    return fmi3_status(fmi_set_logging(instance, loggingOn, nCategories, categories));
 }
 
 /* ---- Intermediate updates ------------------------------------------------------------------- */
@@ -63,36 +63,35 @@ struct answer {
 };
 
 /* Calls the importer in intermediate update mode; an error there ends the step. */
-static enum status call_importer(struct fmi3_component *component, double time,
-                                 bool can_return_early, struct answer *answer) {
-    struct component *base = &component->base;
+static enum status call_importer(struct fmi3_instance *fmi, double time, bool can_return_early,
+                                 struct answer *answer) {
+    struct fmi_instance *base = &fmi->base;
     *answer = (struct answer){.returns_early = fmi3False, .early_time = time};
     base->state = STATE_INTERMEDIATE_UPDATE;
     base->has_failed_inside = false;
-    component->update(component->environment, time, component->can_set, component->can_get,
-                      component->can_get, can_return_early, &answer->returns_early,
-                      &answer->early_time);
+    fmi->update(fmi->environment, time, fmi->can_set, fmi->can_get, fmi->can_get, can_return_early,
+                &answer->returns_early, &answer->early_time);
     base->state = STATE_STEP_COMPLETE;
     return base->has_failed_inside ? STATUS_INVALID_ARGUMENT : STATUS_OK;
 }
 
 /* Lets the importer set the inputs at this time, before the step. */
-static enum status ask_inputs(void *component_pointer, double time) {
-    struct fmi3_component *component = component_pointer;
+static enum status ask_inputs(void *fmi_pointer, double time) {
+    struct fmi3_instance *fmi = fmi_pointer;
     struct answer answer;
-    component->can_set = true;
-    component->can_get = false;
-    return call_importer(component, time, false, &answer);
+    fmi->can_set = true;
+    fmi->can_get = false;
+    return call_importer(fmi, time, false, &answer);
 }
 
 /* Lets the importer get outputs after an internal step; it may ask for the end of the step. */
-static enum status accept(void *component_pointer, double time, double *end) {
-    struct fmi3_component *component = component_pointer;
-    const bool can_return_early = component->early_return_allowed && time < *end;
+static enum status accept(void *fmi_pointer, double time, double *end) {
+    struct fmi3_instance *fmi = fmi_pointer;
+    const bool can_return_early = fmi->early_return_allowed && time < *end;
     struct answer answer;
-    component->can_set = false;
-    component->can_get = true;
-    const enum status status = call_importer(component, time, can_return_early, &answer);
+    fmi->can_set = false;
+    fmi->can_get = true;
+    const enum status status = call_importer(fmi, time, can_return_early, &answer);
     if (can_return_early && answer.returns_early && answer.early_time < *end) {
         *end = answer.early_time;
     }
@@ -101,54 +100,53 @@ static enum status accept(void *component_pointer, double time, double *end) {
 
 /* Prepares steps with these settings. Allocates the snapshot for undoing a step, since steps
  * allocate nothing. */
-static enum status prepare_steps(struct fmi3_component *component) {
-    component->options.context = component;
-    if (component->early_return_allowed) {
-        const bool handles_events = component->base.kind == KIND_CO_SIMULATION_WITH_EVENTS;
-        component->options.at_event = handles_events ? EVENTS_LEFT : EVENTS_END;
+static enum status prepare_steps(struct fmi3_instance *fmi) {
+    fmi->options.context = fmi;
+    if (fmi->early_return_allowed) {
+        const bool handles_events = fmi->base.kind == KIND_CO_SIMULATION_WITH_EVENTS;
+        fmi->options.at_event = handles_events ? EVENTS_LEFT : EVENTS_END;
     }
-    if (component->update != NULL) {
-        component->options.ask_inputs = component->asks_inputs ? ask_inputs : NULL;
-        component->options.accept = accept;
+    if (fmi->update != NULL) {
+        fmi->options.ask_inputs = fmi->asks_inputs ? ask_inputs : NULL;
+        fmi->options.accept = accept;
     }
-    return instance_save(component->base.instance, 0, &component->options.undo);
+    return instance_save(fmi->base.instance, 0, &fmi->options.undo);
 }
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Returns a component without an instance, which can log why there is none. */
-static struct fmi3_component begin(enum fmi_kind kind, fmi3Boolean logging_on,
-                                   fmi3InstanceEnvironment environment,
-                                   fmi3LogMessageCallback logger) {
-    struct fmi3_component component = {.logger = logger, .environment = environment};
-    component_begin(&component.base, &adapter, kind, logging_on);
-    return component;
+/* Returns an FMI instance without an instance, which can log why there is none. */
+static struct fmi3_instance begin(enum fmi_kind kind, fmi3Boolean logging_on,
+                                  fmi3InstanceEnvironment environment,
+                                  fmi3LogMessageCallback logger) {
+    struct fmi3_instance fmi = {.logger = logger, .environment = environment};
+    fmi_begin(&fmi.base, &adapter, kind, logging_on);
+    return fmi;
 }
 
-static struct fmi3_component *instantiate(const char *call, fmi3String name, fmi3String token,
-                                          struct fmi3_component component) {
-    if (!component_check_token(&component.base, name, "instantiation token", token,
-                               model_token_fmi3)) {
+static struct fmi3_instance *instantiate(const char *call, fmi3String name, fmi3String token,
+                                         struct fmi3_instance fmi) {
+    if (!fmi_check_token(&fmi.base, name, "instantiation token", token, model_token_fmi3)) {
         return NULL;
     }
-    struct fmi3_component *created =
+    struct fmi3_instance *created =
         calloc(1, sizeof *created + model_description.variable_count * sizeof(bool));
     if (created == NULL) {
-        component_fail(&component.base, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        fmi_fail(&fmi.base, "%s", status_text(STATUS_OUT_OF_MEMORY));
         return NULL;
     }
-    *created = component;
-    if (component_create_instance(&created->base) != COMPONENT_OK) {
+    *created = fmi;
+    if (fmi_create_instance(&created->base) != FMI_OK) {
         free(created);
         return NULL;
     }
-    component_log(&created->base, COMPONENT_OK, LOG_ALL, "%s", call);
+    fmi_log(&created->base, FMI_OK, LOG_ALL, "%s", call);
     return created;
 }
 
-static void free_component(struct fmi3_component *component) {
-    component_end(&component->base);
-    free(component);
+static void free_component(struct fmi3_instance *fmi) {
+    fmi_end(&fmi->base);
+    free(fmi);
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
@@ -156,7 +154,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3Boolean loggingOn,
                                           fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage) {
-    struct fmi3_component *created =
+    struct fmi3_instance *created =
         instantiate("fmi3InstantiateModelExchange", instanceName, instantiationToken,
                     begin(KIND_MODEL_EXCHANGE, loggingOn, instanceEnvironment, logMessage));
     if (created != NULL) {
@@ -172,24 +170,23 @@ static bool has_intermediate_update(const struct variable *variable) {
            (variable->causality == CAUSALITY_INPUT || variable->causality == CAUSALITY_OUTPUT);
 }
 
-static bool note_intermediate(struct fmi3_component *component,
-                              const fmi3ValueReference references[], size_t count) {
+static bool note_intermediate(struct fmi3_instance *fmi, const fmi3ValueReference references[],
+                              size_t count) {
     if (count > 0 && references == NULL) {
-        component_fail(&component->base,
-                       "the array of %zu variables for intermediate updates is NULL", count);
+        fmi_fail(&fmi->base, "the array of %zu variables for intermediate updates is NULL", count);
         return false;
     }
     for (size_t i = 0; i < count; i++) {
         const struct variable *variable = variable_find(&model_description, references[i]);
         if (variable == NULL || !has_intermediate_update(variable)) {
-            component_fail(&component->base,
-                           "value reference %u is refused for intermediate updates: a continuous "
-                           "input or output is expected",
-                           references[i]);
+            fmi_fail(&fmi->base,
+                     "value reference %u is refused for intermediate updates: a continuous "
+                     "input or output is expected",
+                     references[i]);
             return false;
         }
-        component->is_intermediate[variable - model_description.variables] = true;
-        component->asks_inputs |= variable->causality == CAUSALITY_INPUT;
+        fmi->is_intermediate[variable - model_description.variables] = true;
+        fmi->asks_inputs |= variable->causality == CAUSALITY_INPUT;
     }
     return true;
 }
@@ -201,7 +198,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
     const enum fmi_kind kind = eventModeUsed ? KIND_CO_SIMULATION_WITH_EVENTS : KIND_CO_SIMULATION;
-    struct fmi3_component *created =
+    struct fmi3_instance *created =
         instantiate("fmi3InstantiateCoSimulation", instanceName, instantiationToken,
                     begin(kind, loggingOn, instanceEnvironment, logMessage));
     if (created == NULL) {
@@ -223,25 +220,25 @@ fmi3Instance fmi3InstantiateScheduledExecution(
     fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
     fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption) {
-    struct fmi3_component component =
+    struct fmi3_instance fmi =
         begin(KIND_CO_SIMULATION, loggingOn, instanceEnvironment, logMessage);
-    component_fail(&component.base, "fmi3InstantiateScheduledExecution is refused: this is an FMU "
-                                    "for Model Exchange and Co-Simulation");
+    fmi_fail(&fmi.base, "fmi3InstantiateScheduledExecution is refused: this is an FMU "
+                        "for Model Exchange and Co-Simulation");
     return NULL;
 }
 
 void fmi3FreeInstance(fmi3Instance instance) {
-    struct fmi3_component *component = instance;
-    if (component == NULL || component_refuse_in_logger(&component->base, "fmi3FreeInstance")) {
+    struct fmi3_instance *fmi = instance;
+    if (fmi == NULL || fmi_refuse_in_logger(&fmi->base, "fmi3FreeInstance")) {
         return;
     }
-    if (component->base.state == STATE_INTERMEDIATE_UPDATE) {
-        component_fail(&component->base, "fmi3FreeInstance is not allowed inside a step: nothing "
-                                         "is freed");
+    if (fmi->base.state == STATE_INTERMEDIATE_UPDATE) {
+        fmi_fail(&fmi->base, "fmi3FreeInstance is not allowed inside a step: nothing "
+                             "is freed");
         return;
     }
-    component_log(&component->base, COMPONENT_OK, LOG_ALL, "fmi3FreeInstance");
-    free_component(component);
+    fmi_log(&fmi->base, FMI_OK, LOG_ALL, "fmi3FreeInstance");
+    free_component(fmi);
 }
 
 /* ---- Modes ---------------------------------------------------------------------------------- */
@@ -256,7 +253,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
         .tolerance_defined = toleranceDefined,
         .tolerance = tolerance,
     };
-    struct instance *entered = component_enter(instance, CALL_fmi3EnterInitializationMode);
+    struct instance *entered = fmi_enter(instance, CALL_fmi3EnterInitializationMode);
     if (entered == NULL) {
         return fmi3Error;
     }
@@ -264,20 +261,20 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     if (status == STATUS_OK) {
         status = instance_enter_initialization(entered);
     }
-    return fmi3_status(component_go_to(instance, STATE_INITIALIZATION, status));
+    return fmi3_status(fmi_go_to(instance, STATE_INITIALIZATION, status));
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
-    return fmi3_status(component_exit_initialization(instance, CALL_fmi3ExitInitializationMode));
+    return fmi3_status(fmi_exit_initialization(instance, CALL_fmi3ExitInitializationMode));
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
-    struct instance *entered = component_enter(instance, CALL_fmi3EnterEventMode);
+    struct instance *entered = fmi_enter(instance, CALL_fmi3EnterEventMode);
     if (entered == NULL) {
         return fmi3Error;
     }
     instance_enter_event_mode(entered);
-    return fmi3_status(component_go_to(instance, STATE_EVENT, STATUS_OK));
+    return fmi3_status(fmi_go_to(instance, STATE_EVENT, STATUS_OK));
 }
 
 /* One update decides all modes. Another one is needed only if the importer has passed several time
@@ -289,11 +286,11 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
                                     fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
     const enum fmi3_call call = CALL_fmi3UpdateDiscreteStates;
     struct instance *entered =
-        component_enter_with(instance, call, 1, discreteStatesNeedUpdate, terminateSimulation);
+        fmi_enter_with(instance, call, 1, discreteStatesNeedUpdate, terminateSimulation);
     if (entered == NULL ||
-        !component_check_arrays(instance, call, 1, nominalsOfContinuousStatesChanged,
-                                valuesOfContinuousStatesChanged) ||
-        !component_check_arrays(instance, call, 1, nextEventTimeDefined, nextEventTime)) {
+        !fmi_check_arrays(instance, call, 1, nominalsOfContinuousStatesChanged,
+                          valuesOfContinuousStatesChanged) ||
+        !fmi_check_arrays(instance, call, 1, nextEventTimeDefined, nextEventTime)) {
         return fmi3Error;
     }
     struct discrete_update update;
@@ -309,11 +306,11 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance) {
-    return fmi3_status(component_terminate(instance, CALL_fmi3Terminate));
+    return fmi3_status(fmi_terminate(instance, CALL_fmi3Terminate));
 }
 
 fmi3Status fmi3Reset(fmi3Instance instance) {
-    return fmi3_status(component_reset(instance, CALL_fmi3Reset));
+    return fmi3_status(fmi_reset(instance, CALL_fmi3Reset));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -323,7 +320,7 @@ static struct instance *enter_access(fmi3Instance instance, enum fmi3_call call,
                                      const fmi3ValueReference references[], size_t count,
                                      const void *values, size_t value_count) {
     struct instance *entered = fmi3_check_count(instance, call, value_count, count)
-                                   ? component_enter_with(instance, call, count, references, values)
+                                   ? fmi_enter_with(instance, call, count, references, values)
                                    : NULL;
     return entered != NULL && fmi3_check_access(instance, call, setting, references, count)
                ? entered
@@ -358,7 +355,7 @@ static fmi3Status access_none(fmi3Instance instance, enum fmi3_call call, bool s
     if (enter_access(instance, call, setting, references, count, values, value_count) == NULL) {
         return fmi3Error;
     }
-    return fmi3_status(component_access_none(instance, type, references, count));
+    return fmi3_status(fmi_access_none(instance, type, references, count));
 }
 
 #define ACCESS_NONE(Verb, setting, Type, element)                                                  \
@@ -396,31 +393,32 @@ fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
 /* ---- FMU state ------------------------------------------------------------------------------ */
 
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    return fmi3_status(fmu_state_save(instance, CALL_fmi3GetFMUState, FMUState));
+    return fmi3_status(fmi_snapshot_save(instance, CALL_fmi3GetFMUState, FMUState));
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
-    return fmi3_status(fmu_state_restore(instance, CALL_fmi3SetFMUState, FMUState));
+    return fmi3_status(fmi_snapshot_restore(instance, CALL_fmi3SetFMUState, FMUState));
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    return fmi3_status(fmu_state_free(instance, CALL_fmi3FreeFMUState, FMUState));
+    return fmi3_status(fmi_snapshot_free(instance, CALL_fmi3FreeFMUState, FMUState));
 }
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size) {
-    return fmi3_status(fmu_state_size(instance, CALL_fmi3SerializedFMUStateSize, FMUState, size));
+    return fmi3_status(
+        fmi_snapshot_size(instance, CALL_fmi3SerializedFMUStateSize, FMUState, size));
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
                                  fmi3Byte serializedState[], size_t size) {
-    return fmi3_status(
-        fmu_state_serialize(instance, CALL_fmi3SerializeFMUState, FMUState, serializedState, size));
+    return fmi3_status(fmi_snapshot_serialize(instance, CALL_fmi3SerializeFMUState, FMUState,
+                                              serializedState, size));
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[],
                                    size_t size, fmi3FMUState *FMUState) {
-    return fmi3_status(fmu_state_deserialize(instance, CALL_fmi3DeserializeFMUState,
-                                             serializedState, size, FMUState));
+    return fmi3_status(fmi_snapshot_deserialize(instance, CALL_fmi3DeserializeFMUState,
+                                                serializedState, size, FMUState));
 }
 
 /* ---- Derivatives with respect to other variables -------------------------------------------- */
@@ -434,9 +432,8 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
         !fmi3_check_count(instance, call, nSensitivity, nUnknowns)) {
         return fmi3Error;
     }
-    struct instance *entered =
-        component_enter_with(instance, call, nUnknowns, unknowns, sensitivity);
-    if (entered == NULL || !component_check_arrays(instance, call, nKnowns, knowns, seed)) {
+    struct instance *entered = fmi_enter_with(instance, call, nUnknowns, unknowns, sensitivity);
+    if (entered == NULL || !fmi_check_arrays(instance, call, nKnowns, knowns, seed)) {
         return fmi3Error;
     }
     return result(instance,
@@ -453,8 +450,8 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
         !fmi3_check_count(instance, call, nSensitivity, nKnowns)) {
         return fmi3Error;
     }
-    struct instance *entered = component_enter_with(instance, call, nUnknowns, unknowns, seed);
-    if (entered == NULL || !component_check_arrays(instance, call, nKnowns, knowns, sensitivity)) {
+    struct instance *entered = fmi_enter_with(instance, call, nUnknowns, unknowns, seed);
+    if (entered == NULL || !fmi_check_arrays(instance, call, nKnowns, knowns, sensitivity)) {
         return fmi3Error;
     }
     return result(instance,
@@ -465,8 +462,8 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
 /* ---- Co-Simulation (section 4.2) ------------------------------------------------------------ */
 
 fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
-    return component_enter(instance, CALL_fmi3EnterStepMode) != NULL
-               ? fmi3_status(component_go_to(instance, STATE_STEP_COMPLETE, STATUS_OK))
+    return fmi_enter(instance, CALL_fmi3EnterStepMode) != NULL
+               ? fmi3_status(fmi_go_to(instance, STATE_STEP_COMPLETE, STATUS_OK))
                : fmi3Error;
 }
 
@@ -477,8 +474,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
     const enum fmi3_call call = CALL_fmi3GetOutputDerivatives;
     struct instance *entered =
         enter_access(instance, call, false, valueReferences, nValueReferences, values, nValues);
-    return entered != NULL &&
-                   component_check_arrays(instance, call, nValueReferences, orders, orders)
+    return entered != NULL && fmi_check_arrays(instance, call, nValueReferences, orders, orders)
                ? result(instance, instance_get_output_derivatives(entered, valueReferences,
                                                                   nValueReferences, orders, values))
                : fmi3Error;
@@ -491,20 +487,19 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
     // importers say true, and roll back nevertheless
     const enum fmi3_call call = CALL_fmi3DoStep;
-    const struct fmi3_component *component = instance;
+    const struct fmi3_instance *fmi = instance;
     struct instance *entered =
-        component_enter_with(instance, call, 1, eventHandlingNeeded, terminateSimulation);
-    if (entered == NULL ||
-        !component_check_arrays(instance, call, 1, earlyReturn, lastSuccessfulTime)) {
+        fmi_enter_with(instance, call, 1, eventHandlingNeeded, terminateSimulation);
+    if (entered == NULL || !fmi_check_arrays(instance, call, 1, earlyReturn, lastSuccessfulTime)) {
         return fmi3Error;
     }
-    const enum status status = instance_do_step(entered, currentCommunicationPoint,
-                                                communicationStepSize, &component->options);
+    const enum status status =
+        instance_do_step(entered, currentCommunicationPoint, communicationStepSize, &fmi->options);
     if (status != STATUS_OK) {
         return result(instance, status);
     }
     *eventHandlingNeeded =
-        component->base.kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(entered);
+        fmi->base.kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(entered);
     *terminateSimulation = fmi3False;
     *lastSuccessfulTime = instance_time(entered);
     *earlyReturn = *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
@@ -514,9 +509,9 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 /* ---- Model Exchange: modes (section 3.2) ---------------------------------------------------- */
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
-    struct instance *entered = component_enter(instance, CALL_fmi3EnterContinuousTimeMode);
-    return entered != NULL ? fmi3_status(component_go_to(instance, STATE_CONTINUOUS_TIME,
-                                                         instance_enter_continuous_time(entered)))
+    struct instance *entered = fmi_enter(instance, CALL_fmi3EnterContinuousTimeMode);
+    return entered != NULL ? fmi3_status(fmi_go_to(instance, STATE_CONTINUOUS_TIME,
+                                                   instance_enter_continuous_time(entered)))
                            : fmi3Error;
 }
 
@@ -524,8 +519,8 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
                                        fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
-    struct instance *entered = component_enter_with(instance, CALL_fmi3CompletedIntegratorStep, 1,
-                                                    enterEventMode, terminateSimulation);
+    struct instance *entered = fmi_enter_with(instance, CALL_fmi3CompletedIntegratorStep, 1,
+                                              enterEventMode, terminateSimulation);
     if (entered == NULL) {
         return fmi3Error;
     }
@@ -537,15 +532,15 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
 /* ---- Model Exchange: time and states -------------------------------------------------------- */
 
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
-    struct instance *entered = component_enter(instance, CALL_fmi3SetTime);
+    struct instance *entered = fmi_enter(instance, CALL_fmi3SetTime);
     return entered != NULL ? result(instance, instance_set_time(entered, time)) : fmi3Error;
 }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
                                    size_t nContinuousStates) {
     struct instance *entered =
-        component_enter_with(instance, CALL_fmi3SetContinuousStates, nContinuousStates,
-                             continuousStates, continuousStates);
+        fmi_enter_with(instance, CALL_fmi3SetContinuousStates, nContinuousStates, continuousStates,
+                       continuousStates);
     return entered != NULL
                ? result(instance, instance_set_states(entered, continuousStates, nContinuousStates))
                : fmi3Error;
@@ -554,8 +549,8 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 cont
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[],
                                    size_t nContinuousStates) {
     struct instance *entered =
-        component_enter_with(instance, CALL_fmi3GetContinuousStates, nContinuousStates,
-                             continuousStates, continuousStates);
+        fmi_enter_with(instance, CALL_fmi3GetContinuousStates, nContinuousStates, continuousStates,
+                       continuousStates);
     return entered != NULL
                ? result(instance, instance_get_states(entered, continuousStates, nContinuousStates))
                : fmi3Error;
@@ -563,9 +558,8 @@ fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuous
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[],
                                              size_t nContinuousStates) {
-    struct instance *entered =
-        component_enter_with(instance, CALL_fmi3GetContinuousStateDerivatives, nContinuousStates,
-                             derivatives, derivatives);
+    struct instance *entered = fmi_enter_with(instance, CALL_fmi3GetContinuousStateDerivatives,
+                                              nContinuousStates, derivatives, derivatives);
     return entered != NULL
                ? result(instance, instance_get_derivatives(entered, derivatives, nContinuousStates))
                : fmi3Error;
@@ -573,8 +567,8 @@ fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
                                              size_t nContinuousStates) {
-    struct instance *entered = component_enter_with(
-        instance, CALL_fmi3GetNominalsOfContinuousStates, nContinuousStates, nominals, nominals);
+    struct instance *entered = fmi_enter_with(instance, CALL_fmi3GetNominalsOfContinuousStates,
+                                              nContinuousStates, nominals, nominals);
     return entered != NULL
                ? result(instance, instance_get_nominals(entered, nominals, nContinuousStates))
                : fmi3Error;
@@ -582,8 +576,8 @@ fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[],
                                   size_t nEventIndicators) {
-    struct instance *entered = component_enter_with(
-        instance, CALL_fmi3GetEventIndicators, nEventIndicators, eventIndicators, eventIndicators);
+    struct instance *entered = fmi_enter_with(instance, CALL_fmi3GetEventIndicators,
+                                              nEventIndicators, eventIndicators, eventIndicators);
     return entered != NULL ? result(instance, instance_get_indicators(entered, eventIndicators,
                                                                       nEventIndicators))
                            : fmi3Error;
@@ -592,8 +586,8 @@ fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndica
 /* ---- Model Exchange: numbers ---------------------------------------------------------------- */
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
-    const struct instance *entered = component_enter_with(
-        instance, CALL_fmi3GetNumberOfEventIndicators, 1, nEventIndicators, nEventIndicators);
+    const struct instance *entered = fmi_enter_with(instance, CALL_fmi3GetNumberOfEventIndicators,
+                                                    1, nEventIndicators, nEventIndicators);
     if (entered == NULL) {
         return fmi3Error;
     }
@@ -602,8 +596,8 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventI
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
-    const struct instance *entered = component_enter_with(
-        instance, CALL_fmi3GetNumberOfContinuousStates, 1, nContinuousStates, nContinuousStates);
+    const struct instance *entered = fmi_enter_with(instance, CALL_fmi3GetNumberOfContinuousStates,
+                                                    1, nContinuousStates, nContinuousStates);
     if (entered == NULL) {
         return fmi3Error;
     }

@@ -25,36 +25,35 @@ const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT] = {FMI3_FUNCTION_LIST(FM
 
 /* ---- Checks --------------------------------------------------------------------------------- */
 
-bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
+bool fmi3_check_count(struct fmi_instance *fmi, enum fmi3_call call, size_t count,
                       size_t expected) {
-    if (count == expected || component == NULL) {
+    if (count == expected || fmi == NULL) {
         return true;
     }
-    component_fail(component, "%s: an array has %zu values: %zu are expected",
-                   fmi3_call_rules[call].name, count, expected);
+    fmi_fail(fmi, "%s: an array has %zu values: %zu are expected", fmi3_call_rules[call].name,
+             count, expected);
     return false;
 }
 
-bool fmi3_check_access(struct component *component, enum fmi3_call call, bool setting,
+bool fmi3_check_access(struct fmi_instance *fmi, enum fmi3_call call, bool setting,
                        const fmi3ValueReference references[], size_t count) {
-    if (component->state != STATE_INTERMEDIATE_UPDATE) {
+    if (fmi->state != STATE_INTERMEDIATE_UPDATE) {
         return true;
     }
-    const struct fmi3_component *inside = (const struct fmi3_component *)component;
+    const struct fmi3_instance *inside = (const struct fmi3_instance *)fmi;
     if (!(setting ? inside->can_set : inside->can_get)) {
-        component_fail(component, "%s: this intermediate update does not allow it",
-                       fmi3_call_rules[call].name);
+        fmi_fail(fmi, "%s: this intermediate update does not allow it", fmi3_call_rules[call].name);
         return false;
     }
     for (size_t i = 0; references != NULL && i < count; i++) {
         const struct variable *variable = variable_find(&model_description, references[i]);
         if (variable == NULL || !inside->is_intermediate[variable - model_description.variables] ||
             (setting && variable->causality != CAUSALITY_INPUT)) {
-            component_fail(component,
-                           "%s: value reference %u is refused: in an intermediate update %s that "
-                           "was named at instantiation is expected",
-                           fmi3_call_rules[call].name, references[i],
-                           setting ? "an input" : "a variable");
+            fmi_fail(fmi,
+                     "%s: value reference %u is refused: in an intermediate update %s that "
+                     "was named at instantiation is expected",
+                     fmi3_call_rules[call].name, references[i],
+                     setting ? "an input" : "a variable");
             return false;
         }
     }
@@ -67,11 +66,11 @@ bool fmi3_check_access(struct component *component, enum fmi3_call call, bool se
 
 /* Fails with an error that says why the FMU does not support a call. */
 static fmi3Status unsupported(fmi3Instance instance, enum fmi3_call call, const char *reason) {
-    if (component_enter(instance, call) == NULL) {
+    if (fmi_enter(instance, call) == NULL) {
         return fmi3Error;
     }
     return fmi3_status(
-        component_fail(instance, "%s is not supported: %s", fmi3_call_rules[call].name, reason));
+        fmi_fail(instance, "%s is not supported: %s", fmi3_call_rules[call].name, reason));
 }
 
 static const char no_clocks[] = "the model has no clocks";

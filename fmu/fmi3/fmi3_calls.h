@@ -1,9 +1,9 @@
 /* The structure that an fmi3Instance points to, and checks of the calls of FMI 3.0. */
 #pragma once
 
-#include "component.h"
 #include "fmi3Functions.h"
 #include "fmi3_functions.h"
+#include "fmi_instance.h"
 #include "stepping.h"
 
 #include <stdint.h>
@@ -16,8 +16,8 @@ extern const struct call_rule fmi3_call_rules[FMI3_CALL_COUNT];
 
 /* ---- Component ------------------------------------------------------------------------------ */
 
-struct fmi3_component {
-    struct component base;         /* first */
+struct fmi3_instance {
+    struct fmi_instance base;      /* first */
     fmi3LogMessageCallback logger; /* NULL for no log */
     fmi3InstanceEnvironment environment;
 
@@ -32,22 +32,21 @@ struct fmi3_component {
                                     intermediate updates */
 };
 
-_Static_assert((int)COMPONENT_OK == fmi3OK && (int)COMPONENT_WARNING == fmi3Warning &&
-                   (int)COMPONENT_DISCARD == fmi3Discard && (int)COMPONENT_ERROR == fmi3Error &&
-                   (int)COMPONENT_FATAL == fmi3Fatal,
-               "a component_status is converted by a cast");
+_Static_assert((int)FMI_OK == fmi3OK && (int)FMI_WARNING == fmi3Warning &&
+                   (int)FMI_DISCARD == fmi3Discard && (int)FMI_ERROR == fmi3Error &&
+                   (int)FMI_FATAL == fmi3Fatal,
+               "a fmi_status is converted by a cast");
 _Static_assert(sizeof(int) == sizeof(fmi3Int32), "an fmi3Int32 is an int");
 
-static inline fmi3Status fmi3_status(enum component_status status) {
+static inline fmi3Status fmi3_status(enum fmi_status status) {
     return (fmi3Status)status;
 }
 
-/* Returns true if the number of values is right; otherwise fails as component_fail. */
-bool fmi3_check_count(struct component *component, enum fmi3_call call, size_t count,
-                      size_t expected);
+/* Returns true if the number of values is right; otherwise fails as fmi_fail. */
+bool fmi3_check_count(struct fmi_instance *fmi, enum fmi3_call call, size_t count, size_t expected);
 
 /* Returns true if the variables may be read or set in intermediate update mode; otherwise fails as
- * component_fail. Other modes are not checked here. */
+ * fmi_fail. Other modes are not checked here. */
 NONNULL_ARGUMENTS(1)
-bool fmi3_check_access(struct component *component, enum fmi3_call call, bool setting,
+bool fmi3_check_access(struct fmi_instance *fmi, enum fmi3_call call, bool setting,
                        const fmi3ValueReference references[], size_t count);

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import description_parts
 from declaration.load import Declaration
-from declaration.schema import Float64, Terminal, Unit, Variable
+from declaration.schema import Float64, Terminal, UnitEntry, Variable
 from program import Provenance
 
 TYPES = {"float64": "Float64", "int32": "Int32", "enumeration": "Enumeration", "boolean": "Boolean"}
@@ -87,7 +87,7 @@ def float_type_name(variable: Float64) -> str:
     return f"Float64 in {variable.unit}{nominal}{shown}"
 
 
-def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, Unit]) -> None:
+def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, UnitEntry]) -> None:
     keys = {"name": float_type_name(variable), "unit": variable.unit}
     element = ET.SubElement(parent, "Float64Type", keys)
     element.attrib |= description_parts.display_unit(variable, units)

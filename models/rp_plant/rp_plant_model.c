@@ -68,8 +68,8 @@ static enum status outputs(void *values_pointer, double t) {
     return STATUS_OK;
 }
 
-static enum status propagate(const void *values_pointer, double t, double dt, void *first,
-                             void *second) {
+static enum status derivatives(const void *values_pointer, double t, double dt, void *first,
+                               void *second) {
     const struct rp_plant_values *values = values_pointer;
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
@@ -153,12 +153,12 @@ const struct model rp_plant_model = {
                    sizeof(struct rp_plant_parameters)},
     .inputs = {offsetof(struct rp_plant_values, inputs), sizeof(struct rp_plant_inputs)},
     .states = {offsetof(struct rp_plant_values, q), sizeof(double[4])},
-    .derivatives = {offsetof(struct rp_plant_values, dq), sizeof(double[4])},
+    .dx = {offsetof(struct rp_plant_values, dq), sizeof(double[4])},
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .series = &rp_plant_series,
     .outputs = outputs,
-    .propagate = propagate,
+    .derivatives = derivatives,
     .check_parameters = check_parameters,
     .events = &rp_plant_events,
 };

@@ -53,7 +53,7 @@ def _seconds(given: Any) -> Any:
 Seconds = Annotated[FiniteFloat, BeforeValidator(_seconds, json_schema_input_type=Quantity)]
 
 
-class _Table(BaseModel):
+class _TomlTable(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
@@ -65,7 +65,7 @@ def _one_of(*keys: str) -> ConfigDict:
 KINDS = ("uniform", "log_uniform", "normal", "values")
 
 
-class Distribution(_Table):
+class Distribution(_TomlTable):
     """Values of a parameter: exactly one of the distributions."""
 
     model_config = _one_of(*KINDS)
@@ -108,7 +108,7 @@ class Distribution(_Table):
         return self
 
 
-class Settling(_Table):
+class Settling(_TomlTable):
     """When a variable comes to stay within a band."""
 
     variable: Name
@@ -116,14 +116,14 @@ class Settling(_Table):
     band: Annotated[FiniteFloat, Field(gt=0)] | str
 
 
-class Crossings(_Table):
+class Crossings(_TomlTable):
     """Count of upward crossings of a level by a variable."""
 
     variable: Name
     level: Quantity
 
 
-class Tracking(_Table):
+class Tracking(_TomlTable):
     """Distance of a point from its reference, both given by their coordinates."""
 
     of: Annotated[
@@ -132,7 +132,7 @@ class Tracking(_Table):
     ]
 
 
-class Keep(_Table):
+class Keep(_TomlTable):
     """Measures of each run, and the runs whose trajectories are kept."""
 
     start: list[Name] = []
@@ -148,7 +148,7 @@ class Keep(_Table):
     trajectories: list[NonNegativeInt] = []  # numbers of the runs
 
 
-class Map(_Table):
+class Map(_TomlTable):
     """A picture of one column over two others."""
 
     x: Name
@@ -156,7 +156,7 @@ class Map(_Table):
     colour: Name
 
 
-class Time(_Table):
+class Time(_TomlTable):
     """Times that replace the scenario's or system's, s."""
 
     start: Seconds | None = None
@@ -164,7 +164,7 @@ class Time(_Table):
     step: Annotated[Seconds, Field(gt=0)] | None = None
 
 
-class Campaign(_Table):
+class Campaign(_TomlTable):
     model_config = _one_of("scenario", "system")
     title: Title
     description: Text

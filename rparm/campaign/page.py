@@ -258,16 +258,16 @@ class Page:
 
     # ---- Runs ------------------------------------------------------------------------------------
 
-    def worst(self, column: str) -> pages.Table:
+    def worst(self, column: str) -> pages.PageTable:
         names = [column, *self.campaign.parameters]
         head = [RUN, *(self.labels[name] for name in names), "run it again"]
         rows = [
             [run, *(_rounded(self.table[name][run]) for name in names), self.command(run)]
             for run in worst(self.table[column])
         ]
-        return pages.Table(f"Runs with the largest {column}", head, rows)
+        return pages.PageTable(f"Runs with the largest {column}", head, rows)
 
-    def failures_table(self) -> pages.Table:
+    def failures_table(self) -> pages.PageTable:
         head = ["runs", "the first", "its reason", "run it again"]
         shown, left = self.failures[:LISTED], self.failures[LISTED:]
         rows = [[x.count, x.run, x.reason, self.command(x.run)] for x in shown]
@@ -275,7 +275,7 @@ class Page:
         if left:
             count = sum(failure.count for failure in left)
             note += f" {count} runs with {len(left)} other reasons are not shown."
-        return pages.Table("Failed runs", head, rows, note)
+        return pages.PageTable("Failed runs", head, rows, note)
 
     def map(self, number: int) -> tuple[object, Chart | None, str, int]:
         """Draw a map as its file says; return it, a chart, a note, and the number of runs in it."""

@@ -28,7 +28,7 @@ from rparm.interruption import temporary_folder
 from rparm.report import motion, overview, pages
 from rparm.report.motion import Recorded
 from rparm.report.overview import RAN
-from rparm.report.pages import RunPage, Table
+from rparm.report.pages import PageTable, RunPage
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.units import unit
 
@@ -148,8 +148,8 @@ def replay(
         facts=[("runs of the campaign", str(campaign.count)), ("steps", str(job.steps))],
         data=_data(base, job, given, record),
         tables=[
-            Table("Parameters of this run", ("parameter", "value"), list(given.items())),
-            Table("Kept of it", ("measure", "value"), list(kept.items())),
+            PageTable("Parameters of this run", ("parameter", "value"), list(given.items())),
+            PageTable("Kept of it", ("measure", "value"), list(kept.items())),
         ],
         csv=table.name,
         csv_note="It has all Real outputs.",

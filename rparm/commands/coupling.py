@@ -13,7 +13,7 @@ from rparm.errors import UserError
 from rparm.files import check_writable, from_folder, written
 from rparm.report import overview
 from rparm.report.overview import FAILED, PASSED, RAN
-from rparm.report.pages import RunPage, Table
+from rparm.report.pages import PageTable, RunPage
 from rparm.report.run_data import Axis, Curve, Plot, RunData
 from rparm.systems import comparison, master
 from rparm.systems.comparison import HALVINGS, CouplingStudy, Halved
@@ -126,7 +126,7 @@ def _finite(numbers: Sequence[float]) -> list[float | None]:
     return [x if math.isfinite(x) else None for x in numbers]
 
 
-def _table(found: Sequence[Halved]) -> Table:
+def _table(found: Sequence[Halved]) -> PageTable:
     rows = []
     for x in found:
         orders = [*(f"{p:.2f}" if math.isfinite(p) else "–" for p in x.orders), "–", "–"]
@@ -134,10 +134,10 @@ def _table(found: Sequence[Halved]) -> Table:
             names = x.order.replace("_", "-"), x.inputs, duration(step)
             rows.append([*names, exponents(f"{error:.2g}"), p, x.worst])
     head = ["order", "inputs", "step", "error", "of order", "largest of"]
-    return Table("Errors of the coupling", head, rows)
+    return PageTable("Errors of the coupling", head, rows)
 
 
-def _limits(system: OpenedSystem, variant: str) -> tuple[Table | None, str]:
+def _limits(system: OpenedSystem, variant: str) -> tuple[PageTable | None, str]:
     """Return the table of the largest stable steps, or why there is none."""
     from rparm.linearization import page, study
 
@@ -173,7 +173,7 @@ def _study(options: argparse.Namespace, folder: Path, known: CouplingStudy) -> E
         status=FAILED if failed else PASSED,
         facts=[("system", folder.name)],
         data=None,
-        tables=[Table("Parts", ["part", "result"], rows)],
+        tables=[PageTable("Parts", ["part", "result"], rows)],
         diagram=(beside, "Errors over the communication step"),
         again=_again(options, []),
     )

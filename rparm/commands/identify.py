@@ -187,7 +187,7 @@ def _print(found: "Identification", true: dict[str, float]) -> None:
     rows = results.rows(found, true)
     titles = ["value", "low", "high", *(["true"] if true else [])]
     columns = dict.fromkeys(titles, 10) | {"unit": 9}
-    table = console.Table("parameter", [row[0] for row in rows], columns, result=0)
+    table = console.PrintedTable("parameter", [row[0] for row in rows], columns, result=0)
     for name, cells, unit in rows:
         table.row(name, [*cells, unit])
     second = found.validation

@@ -168,7 +168,7 @@ def _runs(
     names = [
         f"{m} at {short(proof.tolerance_of(m, tolerance or scenario.tolerance))}" for m in methods
     ]
-    table = console.Table("method", [*names, "interval"], heads, result=0)
+    table = console.PrintedTable("method", [*names, "interval"], heads, result=0)
     found, courses = {}, {}
     for method, name in zip(methods, names, strict=True):
         with Progress(f"{scenario.name}, {method}", len(scenario.times) - 1) as progress:
@@ -190,7 +190,7 @@ def _references(options: argparse.Namespace) -> Ended:
     for name, program in enclosures.provers().items():
         folder = project.model(name)
         files = [x for x in project.scenario_files().values() if x.parents[1] == folder]
-        table = console.Table("reference", [x.stem for x in files], COLUMNS)
+        table = console.PrintedTable("reference", [x.stem for x in files], COLUMNS)
         with Fmu(project.built(folder, ".fmu")) as fmu:
             proofs = {}
             for scenario in [scenarios.load(path, fmu.model) for path in files]:

@@ -70,7 +70,7 @@ class InputPolynomials:
     set: Call
 
 
-class SavedState:
+class Snapshot:
     """The state of an instance at some time; its functions raise FMICallException if they fail."""
 
     def __init__(self, component: c_void_p, *calls: Callable[..., object]) -> None:
@@ -300,7 +300,7 @@ class Instance(ABC):
         """Step from `start` (s), for good unless it `goes_back`; FMICallException if that fails."""
 
     @abstractmethod
-    def saved_state(self) -> SavedState:
+    def snapshot(self) -> Snapshot:
         """Return an empty place for a state to go back to."""
 
 

@@ -10,8 +10,8 @@ from fmpy.model_description import DefaultExperiment, ModelDescription, ModelVar
 
 from rparm.errors import WrongValueError, did_you_mean, hint
 from rparm.files import show
+from rparm.fmu_tools.compiler.units import ANGLE
 from rparm.units import (
-    ANGLE,
     Displays,
     Units,
     display_unit,

@@ -20,7 +20,7 @@ from rparm.fmi.fmi_instance import (
     Call,
     InputPolynomials,
     Instance,
-    SavedState,
+    Snapshot,
     UnpackedFmu,
     doubles,
 )
@@ -111,9 +111,9 @@ class Fmi2Instance(Instance):
         final = fmi2.fmi2False if goes_back else fmi2.fmi2True
         self.fmi.fmi2DoStep(self.fmi.component, start, length, final)
 
-    def saved_state(self) -> SavedState:
+    def snapshot(self) -> Snapshot:
         calls = (getattr(self.fmi, f"fmi2{name}FMUstate") for name in ("Get", "Set", "Free"))
-        return SavedState(self.fmi.component, *calls)
+        return Snapshot(self.fmi.component, *calls)
 
 
 class Fmi3Instance(Instance):
@@ -233,9 +233,9 @@ class Fmi3Instance(Instance):
             time = self._time.value
             raise UserError(f"{self.name}: the FMU ends the simulation at t = {time!r} s")
 
-    def saved_state(self) -> SavedState:
+    def snapshot(self) -> Snapshot:
         calls = (getattr(self.fmi, f"fmi3{name}FMUState") for name in ("Get", "Set", "Free"))
-        return SavedState(self.fmi.component, *calls)
+        return Snapshot(self.fmi.component, *calls)
 
 
 class _ModelExchange(Instance):

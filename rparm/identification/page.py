@@ -102,7 +102,7 @@ def _validation(found: Identification, model: Model, times: np.ndarray) -> list[
 
 
 # ---- Tables --------------------------------------------------------------------------------------
-def _parameters(found: Identification, true: Mapping[str, float]) -> pages.Table:
+def _parameters(found: Identification, true: Mapping[str, float]) -> pages.PageTable:
     head = ["parameter", "value", "low", "high", "classical low", "classical high", "start", "unit"]
     rows = []
     for parameter in found.checked.parameters.every:
@@ -116,7 +116,7 @@ def _parameters(found: Identification, true: Mapping[str, float]) -> pages.Table
         head.insert(2, "true")
         for row in rows:
             row.insert(2, results.text(true.get(str(row[0]))))
-    return pages.Table(
+    return pages.PageTable(
         "Parameters",
         head,
         rows,
@@ -125,7 +125,7 @@ def _parameters(found: Identification, true: Mapping[str, float]) -> pages.Table
     )
 
 
-def _outputs(found: Identification, model: Model) -> pages.Table:
+def _outputs(found: Identification, model: Model) -> pages.PageTable:
     head = ["output", "noise", "residuals", "unit", "Ljung-Box", "p", "white"]
     rows = []
     counts = np.vstack([segment.counts for segment in found.segments])
@@ -137,7 +137,7 @@ def _outputs(found: Identification, model: Model) -> pages.Table:
         sizes = exponents(f"{noise:.3g}"), exponents(f"{rms:.3g}"), unit(model.variables[name].unit)
         is_white = "yes" if test.is_white else "no"
         rows.append([name, *sizes, f"{test.statistic:.4g}", exponents(f"{test.p:.2g}"), is_white])
-    return pages.Table(
+    return pages.PageTable(
         "Measured outputs",
         head,
         rows,
@@ -151,7 +151,7 @@ def _lags(found: Identification) -> int:
     return max(len(test.correlations) for test in found.whiteness.values())
 
 
-def _second(found: Identification, model: Model) -> pages.Table:
+def _second(found: Identification, model: Model) -> pages.PageTable:
     second = found.validation
     assert second is not None
     rows = [
@@ -161,7 +161,7 @@ def _second(found: Identification, model: Model) -> pages.Table:
         )
     ]
     late = " and the delay" if DELAY in found.estimates else ""
-    return pages.Table(
+    return pages.PageTable(
         f"Validation on {second.recording.path.name}",
         ["output", "RMS of the error", "unit", "follows for"],
         rows,

@@ -26,7 +26,7 @@ from rparm.report import pages
 from rparm.report.charts import Chart, Data
 from rparm.units import duration, exponents, unit
 
-Part = tuple[pages.Table, str, list[Chart]]
+Part = tuple[pages.PageTable, str, list[Chart]]
 NONE = "–"
 LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
@@ -68,7 +68,7 @@ def write(folder: Path, found: Study, step: float | None, again: str, root: str 
         parts.append((margins_table(found.margins), MARGINS, [*made]))
         title = "Step response of the closed loop"
         made = [steps_chart(closed(loop), None, found.units, title)]
-        parts.append((pages.Table(title, [], []), "", made))
+        parts.append((pages.PageTable(title, [], []), "", made))
     said = notes(found)
     if loop is None and linear.inputs and linear.outputs:
         answers = responding(linear)
@@ -76,7 +76,7 @@ def write(folder: Path, found: Study, step: float | None, again: str, root: str 
         if answers.any():
             shown = drawn(linear, answers)
             responses = [bode_chart(shown, step), steps_chart(shown, step, found.units)]
-            parts.append((pages.Table("Responses", [], []), "", responses))
+            parts.append((pages.PageTable("Responses", [], []), "", responses))
     if len(linear.states):
         table = poles_table(found)
         rows = zip(table.rows, _rows_of(linear, taking_part(linear)), strict=True)
@@ -185,31 +185,31 @@ def _names(names: Sequence[str]) -> str:
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
-def point_table(found: Study) -> pages.Table:
+def point_table(found: Study) -> pages.PageTable:
     """Return the values of states and inputs."""
     values = found.linear.at
     rows = [[name, value, unit(found.units.get(name))] for name, value in values.items()]
-    return pages.Table("The point", ["variable", "value", "unit"], rows)
+    return pages.PageTable("The point", ["variable", "value", "unit"], rows)
 
 
-def equilibrium_table(found: Study) -> pages.Table:
+def equilibrium_table(found: Study) -> pages.PageTable:
     """Return the trimmed values, and the range where friction or a stop leaves one."""
     rows = []
     for name in found.trimmed:
         ends = found.linear.intervals.get(name, (math.nan, math.nan))
         numbers = _short(found.linear.at[name]), *map(_or_none, ends)
         rows.append([name, *numbers, unit(found.units.get(name))])
-    return pages.Table("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
+    return pages.PageTable("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
 
 
-def poles_table(found: Study) -> pages.Table:
+def poles_table(found: Study) -> pages.PageTable:
     """Return poles, conjugate pairs in one row."""
     linear = found.linear
     cells = [*map(_pole_cells, linear.poles, linear.rates_of(linear.poles))]
     first = ["real part", "imaginary"] if linear.dt else ["real part (1/s)", "imaginary (rad/s)"]
     head = [*first, "frequency (Hz)", "damping", "time constant (s)"]
     title = "Poles" if found.loop is None else "Poles of the broken loop"
-    return pages.Table(title, head, _rows_of(linear, cells))
+    return pages.PageTable(title, head, _rows_of(linear, cells))
 
 
 def _rows_of(linear: Linear, items: Sequence[list[str]]) -> list[list[str]]:
@@ -272,7 +272,7 @@ def _hertz(at: Crossing | Peak) -> float:
     return at.frequency / (2 * math.pi)
 
 
-def margins_table(found: Margins) -> pages.Table:
+def margins_table(found: Margins) -> pages.PageTable:
     """Return the margins of a loop; those that it does not have are "–"."""
     at = {name: _or_none(_hertz(x)) for name, x in marks(found).items()}
     delay = duration(found.delay) if math.isfinite(found.delay) else NONE
@@ -287,10 +287,10 @@ def margins_table(found: Margins) -> pages.Table:
             ("peak of the complementary one", found.complementary))),
         *(["the loop's gain is 1", NONE, _short(_hertz(x))] for x in found.gain_crossings),
     ]  # fmt: skip
-    return pages.Table("Margins", ["margin", "value", "at (Hz)"], rows)
+    return pages.PageTable("Margins", ["margin", "value", "at (Hz)"], rows)
 
 
-def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> pages.Table:
+def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> pages.PageTable:
     """Return the largest stable step of each way to step."""
     rows = []
     for x in found:
@@ -298,17 +298,17 @@ def steps_table(found: list[LargestStep] | tuple[LargestStep, ...]) -> pages.Tab
         text = text if math.isfinite(x.step) else "no limit found"
         rows.append([x.order.replace("_", "-"), x.inputs, text, _or_none(x.frequency)])
     head = ["order", "inputs", "largest stable step", "frequency (Hz)"]
-    return pages.Table("Largest stable communication step", head, rows)
+    return pages.PageTable("Largest stable communication step", head, rows)
 
 
-def matrices_table(found: Study) -> pages.Table:
+def matrices_table(found: Study) -> pages.PageTable:
     """Return the matrix [A B; C D]."""
     linear = found.linear
     whole = np.block([[linear.A, linear.B], [linear.C, linear.D]])
     names = (*(name + "'+"[linear.dt > 0] for name in linear.states), *linear.outputs)
     pairs = zip(names, whole, strict=True)
     rows = [[name, *(_short(float(x)) for x in row)] for name, row in pairs]
-    return pages.Table("A, B, C and D", ["", *linear.states, *linear.inputs], rows)
+    return pages.PageTable("A, B, C and D", ["", *linear.states, *linear.inputs], rows)
 
 
 def _short(number: float) -> str:

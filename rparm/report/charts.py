@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rparm.report import pages
-from rparm.report.pages import RunPage, Table
+from rparm.report.pages import PageTable, RunPage
 
 Data = dict[str, Any]
 DIGITS = 7  # of numbers
@@ -32,7 +32,7 @@ class Chart:
 
 
 def write_page(
-    path: Path, page: RunPage, first: Table, drawn: Sequence[Chart], rest: str, root: str
+    path: Path, page: RunPage, first: PageTable, drawn: Sequence[Chart], rest: str, root: str
 ) -> Path:
     """Write a page with a table and charts before its plots, headed `rest`; its path."""
     values = {"page": page, "data": page.data and page.data.json(), "root": root}

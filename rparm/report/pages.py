@@ -81,7 +81,7 @@ class Command(str):
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """A table of a page."""
 
     title: str
@@ -100,7 +100,7 @@ class RunPage:
     status: str
     facts: Sequence[tuple[str, str]]
     data: RunData | None  # None: nothing was recorded
-    tables: Sequence[Table]
+    tables: Sequence[PageTable]
     notes: Sequence[str] = ()
     failures: Sequence[str] = ()
     csv: str = ""  # file name beside the page, if there is one

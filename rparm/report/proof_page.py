@@ -12,7 +12,7 @@ from rparm.proof.errors import ProvenReference, largest_errors
 from rparm.report import charts, overview
 from rparm.report.charts import Chart
 from rparm.report.overview import FAILED, PASSED, PROOFS
-from rparm.report.pages import RunPage, Table
+from rparm.report.pages import PageTable, RunPage
 from rparm.report.run_data import Curve, Plot, RunData, thinned
 from rparm.runs.scenario import Scenario
 from rparm.units import SMALLEST, number, rounded_up, unit
@@ -106,7 +106,7 @@ def write_references(
         status=_status(found.values()),
         facts=[("references", str(len(rows)))],
         data=None,
-        tables=[Table("References", head, rows)],
+        tables=[PageTable("References", head, rows)],
         notes=[ASSUMES],
         failures=[str(wrong) for good in found.values() for wrong in good.wrong],
         again=again,
@@ -118,11 +118,11 @@ def _status(references: Iterable[ProvenReference]) -> str:
     return PASSED if all(good.passed for good in references) else FAILED
 
 
-def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:
+def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> PageTable:
     """Return the largest error of each state in each run, and its time."""
     heads = [f"{n} in {unit(model.variables[n].unit)}" for n in enclosure.names]
     rows = []
     for run, course in errors.items():
         largest = largest_errors(course, enclosure).values()
         rows.append((run, *(f"{rounded_up(e.error, 2)} at {e.at:.4g} s" for e in largest)))
-    return Table("Largest proven errors", ("run", *heads), rows)
+    return PageTable("Largest proven errors", ("run", *heads), rows)

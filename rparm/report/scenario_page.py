@@ -13,7 +13,7 @@ from rparm.proof.enclosure import ASSUMED
 from rparm.proof.errors import ProvenError, errors_of_run
 from rparm.report import motion, overlay, overview
 from rparm.report.overview import FAILED, PASSED, RAN, Entry
-from rparm.report.pages import RunPage, Table
+from rparm.report.pages import PageTable, RunPage
 from rparm.report.run_data import Curve, Plot, RunData, result_curve, thinned
 from rparm.runs.comparison import Comparison, Failure, Run, comparisons, estimated_from
 from rparm.runs.inputs import Constant, Log, Logged, Signal, Sines, Switches
@@ -270,13 +270,13 @@ def _csv_note(run: Run, shown: int) -> str:
     return " ".join(texts)
 
 
-def _tables(runs: Sequence[Run]) -> list[Table]:
+def _tables(runs: Sequence[Run]) -> list[PageTable]:
     scenario, model, result = runs[0].scenario, runs[0].fmu.model, runs[0].result
     measured = measured_tables(list(comparisons(scenario, result)), model)
     return [*measured, *_start_tables(scenario, model), _solver(runs), _errors(runs)]
 
 
-def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
+def _start_tables(scenario: Scenario, model: Model) -> list[PageTable]:
     """Return tables of parameters, initial state and inputs."""
     given = scenario.parameters | scenario.initial
     tables = []
@@ -288,7 +288,7 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
             known = model.variables[name]
             rows.append((name, unit(known.unit), describe_signal(signal), known.description))
         note = "Sampled at communication points, each held over the step that begins there."
-        tables.append(Table("Inputs", ("input", "unit", "course", "meaning"), rows, note))
+        tables.append(PageTable("Inputs", ("input", "unit", "course", "meaning"), rows, note))
     rest = {
         name: value
         for name, value in scenario.defaults.items()
@@ -301,9 +301,9 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
     return tables
 
 
-def _values(title: str, model: Model, values: dict, folded: bool = False) -> Table:
+def _values(title: str, model: Model, values: dict, folded: bool = False) -> PageTable:
     rows = [cells(model.variables[name], value) for name, value in values.items()]
-    return Table(title, ("name", "value", "unit", "meaning"), rows, folded=folded)
+    return PageTable(title, ("name", "value", "unit", "meaning"), rows, folded=folded)
 
 
 def cells(variable: Variable, value: Value) -> tuple[str, object, str, str]:
@@ -313,7 +313,7 @@ def cells(variable: Variable, value: Value) -> tuple[str, object, str, str]:
     return variable.name, text, unit(variable.unit), variable.description
 
 
-def _solver(runs: Sequence[Run]) -> Table:
+def _solver(runs: Sequence[Run]) -> PageTable:
     twin = runs[0].twin
     head = ["tolerance", "steps", "solver steps", "evaluations", "wall time", "worst error", "of"]
     rows = []
@@ -328,10 +328,10 @@ def _solver(runs: Sequence[Run]) -> Table:
         rows.append(row)
     if twin is not None:
         head.append(f"in FMI {twin.fmi_version}")
-    return Table("Solver", head, rows)
+    return PageTable("Solver", head, rows)
 
 
-def _errors(runs: Sequence[Run]) -> Table:
+def _errors(runs: Sequence[Run]) -> PageTable:
     head = ["output", "unit", *(f"tolerance {short(run.result.tolerance)}" for run in runs)]
     variables = runs[0].fmu.model.variables
     rows = [
@@ -340,7 +340,7 @@ def _errors(runs: Sequence[Run]) -> Table:
         if all(name in run.errors for run in runs)
     ]
     note = "Largest difference from the reference, relative to the output's largest value."
-    return Table("Errors of all outputs", head, rows, note=note, folded=True)
+    return PageTable("Errors of all outputs", head, rows, note=note, folded=True)
 
 
 def with_measured(
@@ -362,7 +362,7 @@ def with_measured(
     return result
 
 
-def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[Table]:
+def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[PageTable]:
     """Return a table of the distance from measured values; none without measurements."""
     if not comparisons:
         return []
@@ -372,7 +372,7 @@ def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[Tab
     ]
     head = ("output", "unit", "RMS", "largest", "log")
     note = "Simulated less measured, over the rows of the values that the log covers."
-    return [Table("Difference from what was measured", head, rows, note)]
+    return [PageTable("Difference from what was measured", head, rows, note)]
 
 
 def describe_signal(signal: Signal) -> str:

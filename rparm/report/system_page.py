@@ -17,7 +17,7 @@ from rparm.files import from_here, whole, write_text
 from rparm.fmi.model import KINDS
 from rparm.report import block_diagram, motion, overlay, overview, pages
 from rparm.report.overview import FAILED, PASSED, RAN, SYSTEM, Entry
-from rparm.report.pages import RunPage, Table
+from rparm.report.pages import PageTable, RunPage
 from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.report.scenario_page import cells, meanings
 from rparm.runs.inputs import Log
@@ -295,7 +295,7 @@ def _description(section: Section, variant: str) -> str:
     return f"{said.rstrip('.')}. {how}" if said else how
 
 
-def _parameters(ssp: OpenedSystem, variant: str) -> list[Table]:
+def _parameters(ssp: OpenedSystem, variant: str) -> list[PageTable]:
     """Return a table of the variant's values, then start values per component."""
     given = ssp.system.parameter_sets[variant]
     connected = {(x.end_component, x.end_connector) for x in ssp.system.connections}
@@ -313,13 +313,13 @@ def _parameters(ssp: OpenedSystem, variant: str) -> list[Table]:
         ]
         if rest:
             title = f"All other start values of {component}"
-            others.append(Table(title, ("name", "value", "unit", "meaning"), rest, folded=True))
+            others.append(PageTable(title, ("name", "value", "unit", "meaning"), rest, folded=True))
     head = ("component", "name", "value", "unit", "meaning")
-    own = [Table("Parameters of this variant", head, rows)] if rows else []
+    own = [PageTable("Parameters of this variant", head, rows)] if rows else []
     return own + others
 
 
-def _solvers(ssp: OpenedSystem, run: ecos.Run) -> list[Table]:
+def _solvers(ssp: OpenedSystem, run: ecos.Run) -> list[PageTable]:
     """Return statistics of the components that integrate."""
     rows = []
     for component in ssp.models:
@@ -328,10 +328,12 @@ def _solvers(ssp: OpenedSystem, run: ecos.Run) -> list[Table]:
             cells = ("–" if x is None else int(x) if x == int(x) else short(x) for x in values)
             rows.append((component, *cells))
     note = "Of components with a solver, from the start to the end of the run."
-    return [Table("Solvers", ("component", *ecos.STATISTICS.values()), rows, note)] if rows else []
+    return (
+        [PageTable("Solvers", ("component", *ecos.STATISTICS.values()), rows, note)] if rows else []
+    )
 
 
-def _errors(ssp: OpenedSystem, outcome: Outcome) -> list[Table]:
+def _errors(ssp: OpenedSystem, outcome: Outcome) -> list[PageTable]:
     found = outcome.errors.items()
     rows = [(name, unit(ssp.variable(name).unit), f"{error:.2e}") for name, error in found]
     note = "Largest difference from the reference of Ecos's order, relative to the variable's "
@@ -342,4 +344,4 @@ def _errors(ssp: OpenedSystem, outcome: Outcome) -> list[Table]:
         note = "Twice the largest difference from a run with half the step, as of an error of "
         note += "first order, relative to the largest value of all variables of this unit."
     head = "variable", "unit", "error"
-    return [Table(title, head, rows, note, folded=True)] if rows else []
+    return [PageTable(title, head, rows, note, folded=True)] if rows else []

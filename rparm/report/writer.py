@@ -15,7 +15,7 @@ from rparm.report import overview, pages, scenario_page
 from rparm.report.overlay import Others
 from rparm.report.overview import FAILED, FILES, PASSED, SCENARIOS, STUDIES, Entry
 from rparm.report.overview import sparkline as sparkline
-from rparm.report.pages import RunPage, Table
+from rparm.report.pages import PageTable, RunPage
 from rparm.report.run_data import Axis, Curve, Plot, RunData
 from rparm.runs import comparison
 from rparm.runs.comparison import Failure, Run, Sweep
@@ -140,7 +140,7 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep], again: str) -> Entry:
         status=PASSED if passed else FAILED,
         facts=[("scenarios", str(len(sweeps)))],
         data=data,
-        tables=[Table("Errors", ["scenario", *map(short, x), "result"], rows)],
+        tables=[PageTable("Errors", ["scenario", *map(short, x), "result"], rows)],
         failures=[f"{s.scenario.name}: {text}" for s in sweeps for text in s.violations],
         again=again,
     )
@@ -167,7 +167,7 @@ def write_convergence(folder: Path, study: Convergence, again: str) -> Entry:
         status=PASSED if study.passed else FAILED,
         facts=[("model", model), ("tolerance", short(scenario.tolerance))],
         data=RunData(scenario.name, "", 1e3 * steps, [plot], axis),
-        tables=[Table("Errors", head, rows)],
+        tables=[PageTable("Errors", head, rows)],
         notes=[UPDATE_NOTE] if updated else [],
         failures=study.violations,
         again=again,

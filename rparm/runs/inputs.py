@@ -135,7 +135,7 @@ class Sines:
 
 
 @dataclass(frozen=True)
-class Table:
+class Polyline:
     """Linear between points, constant before the first and after the last."""
 
     points: tuple[tuple[float, float], ...]  # s since the start, value; in order of time
@@ -180,7 +180,7 @@ class Logged:
         return inside & ~(is_between & np.append(_gaps(self.times), False)[before])
 
 
-Signal = Constant | Sines | Table | Switches | Logged
+Signal = Constant | Sines | Polyline | Switches | Logged
 
 
 # ---- Logs ----------------------------------------------------------------------------------------
@@ -526,9 +526,9 @@ class InputReader:
             terms.append((amplitude, frequency, phase))
         return Sines(offset, tuple(terms))
 
-    def _points(self, table: dict[str, Any], where: str, variable: Variable) -> Table:
+    def _points(self, table: dict[str, Any], where: str, variable: Variable) -> Polyline:
         rows, known = self._rows(table, where), variable.units
-        return Table(tuple((t, self._reader.quantity(v, key, known)) for t, v, key in rows))
+        return Polyline(tuple((t, self._reader.quantity(v, key, known)) for t, v, key in rows))
 
     def _rows(self, table: dict[str, Any], where: str) -> list[tuple[float, Any, str]]:
         """Read times in s, values as they stand in the file, and their keys."""

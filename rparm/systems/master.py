@@ -129,7 +129,7 @@ def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Va
 
 
 # ---- The master ----------------------------------------------------------------------------------
-class Snapshot(AbstractContextManager["Snapshot"]):
+class SystemSnapshot(AbstractContextManager["SystemSnapshot"]):
     """The state of a whole system at a communication point; a context manager that frees it."""
 
     def __init__(self, master: "Master") -> None:
@@ -139,7 +139,7 @@ class Snapshot(AbstractContextManager["Snapshot"]):
             if not fmu.model.saves_states:
                 has = "save() and restore(state)" if is_python(fmu.path.name) else "FMU state"
                 raise UserError(f"{component.name}: {fmu.path} has no {has} to go back")
-        self._states = [c.instance.saved_state() for c in master.components.values()]
+        self._states = [c.instance.snapshot() for c in master.components.values()]
 
     def __exit__(self, *_: object) -> None:
         for state in self._states:

@@ -31,7 +31,7 @@ from rparm.fmi.fmi_instance import (
     Call,
     InputPolynomials,
     Instance,
-    SavedState,
+    Snapshot,
     no_call,
     view,
 )
@@ -471,8 +471,8 @@ class PythonInstance(Instance):
     def _reals(self, result: Mapping[str, Any], when: str) -> list[float]:
         return [self._number(name, result[name], when) for name in self.made.outputs]
 
-    def saved_state(self) -> SavedState:
-        return cast(SavedState, _State(self))
+    def snapshot(self) -> Snapshot:
+        return cast(Snapshot, _Snapshot(self))
 
     def save(self) -> Any:
         """Return a copy of what the user's save() gives."""
@@ -516,8 +516,8 @@ class PythonInstance(Instance):
         return int(number)
 
 
-class _State:
-    """A saved state, as `SavedState` of an FMU."""
+class _Snapshot:
+    """A snapshot of an instance in Python, which does what one of an FMU does."""
 
     def __init__(self, instance: PythonInstance) -> None:
         self._instance = instance

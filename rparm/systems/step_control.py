@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rparm.errors import UserError
-from rparm.systems.master import Master, Snapshot
+from rparm.systems.master import Master, SystemSnapshot
 
 SAFETY = 0.9  # of the step that would just reach the tolerance
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 2.5  # from one step to the next
@@ -74,7 +74,7 @@ def run(
     steps = _Steps(master, control)
     times, rows, estimates, limited = [master.time], [master.values.copy()], [], []
     ends = deque(sorted(t for t in {*control.corners, stop} if master.time < t <= stop))
-    with Snapshot(master) as begin, Snapshot(master) as end:
+    with SystemSnapshot(master) as begin, SystemSnapshot(master) as end:
         begin.take()
         while ends:
             start = times[-1]
@@ -114,7 +114,7 @@ class _Steps:
         self.wanted, self.was_rejected = control.first, True  # s; whether the last attempt was
         self.rejected, self.do_steps = 0, 0
 
-    def attempt(self, begin: Snapshot, start: float, target: float) -> float:
+    def attempt(self, begin: SystemSnapshot, start: float, target: float) -> float:
         """Make a step whole, then in two halves, which are kept; the estimate of its error."""
         master, calls = self._master, self._master.do_steps
         master.advance(target)

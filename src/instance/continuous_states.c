@@ -125,7 +125,7 @@ enum status instance_get_derivatives(struct instance *instance, double dx[], siz
     if (status == STATUS_OK) {
         status = instance_update_outputs(instance);
     }
-    return status != STATUS_OK ? status : copy_finite(instance, instance->model->derivatives, dx);
+    return status != STATUS_OK ? status : copy_finite(instance, instance->model->dx, dx);
 }
 
 enum status instance_get_nominals(struct instance *instance, double nominals[], size_t count) {

@@ -89,10 +89,10 @@ enum status instance_set_input_derivatives(struct instance *instance, const unsi
 
 /* Writes the derivatives of all calculated values to instance->first_derivatives and second, which
  * may be NULL. */
-static enum status propagate(struct instance *instance, double dt, char *second) {
+static enum status derive(struct instance *instance, double dt, char *second) {
     const double t = instance->state.time.s;
-    const enum status status = instance->model->propagate(instance->memory.values, t, dt,
-                                                          instance->first_derivatives, second);
+    const enum status status = instance->model->derivatives(instance->memory.values, t, dt,
+                                                            instance->first_derivatives, second);
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no derivatives at t = %.17g: %s", t,
                       status_text(status));
@@ -106,7 +106,7 @@ static void begin_by_time(const struct instance *instance, int order, char *belo
                           char *derivatives) {
     const struct model *model = instance->model;
     memset(derivatives, 0, model->values_size);
-    memcpy(doubles_of(derivatives, model->states), doubles_of(below, model->derivatives),
+    memcpy(doubles_of(derivatives, model->states), doubles_of(below, model->dx),
            model->states.size);
     for (size_t i = 0; i < count_of(model->inputs); i++) {
         doubles_of(derivatives, model->inputs)[i] = instance->memory.current_inputs[i].d[order];
@@ -121,12 +121,12 @@ static enum status derive_by_time(struct instance *instance) {
         return status;
     }
     begin_by_time(instance, 1, instance->memory.values, instance->first_derivatives);
-    status = propagate(instance, 1.0, NULL);
+    status = derive(instance, 1.0, NULL);
     if (status != STATUS_OK) {
         return status;
     }
     begin_by_time(instance, 2, instance->first_derivatives, instance->second_derivatives);
-    return propagate(instance, 1.0, instance->second_derivatives);
+    return derive(instance, 1.0, instance->second_derivatives);
 }
 
 /* Returns the derivative of a variable, from a value structure of derivatives; 0 for variables of
@@ -272,7 +272,7 @@ enum status instance_get_directional_derivative(struct instance *instance, enum 
         const struct variable *variable = variable_of(instance->description, knowns[i]);
         *(is_time(variable) ? &dt : double_in(instance->first_derivatives, variable)) += v[i];
     }
-    status = propagate(instance, dt, NULL);
+    status = derive(instance, dt, NULL);
     if (status != STATUS_OK) {
         return status;
     }
@@ -295,7 +295,7 @@ static enum status multiply_column(struct instance *instance, const unsigned unk
     memset(instance->first_derivatives, 0, instance->model->values_size);
     double dt = 0.0;
     *(is_time(known) ? &dt : double_in(instance->first_derivatives, known)) = 1.0;
-    enum status status = propagate(instance, dt, NULL);
+    enum status status = derive(instance, dt, NULL);
     *product = 0.0;
     for (size_t i = 0; status == STATUS_OK && i < unknown_count; i++) {
         const struct variable *unknown = variable_of(instance->description, unknowns[i]);

@@ -70,8 +70,7 @@ static const struct variable *rate_of(const struct instance *instance,
                                       const struct variable *state) {
     const struct model *model = instance->model;
     return instance_is_state(instance, state)
-               ? variable_at(instance,
-                             model->derivatives.offset + state->offset - model->states.offset)
+               ? variable_at(instance, model->dx.offset + state->offset - model->states.offset)
                : NULL;
 }
 
@@ -176,9 +175,8 @@ static void add_cause(const struct place *place, const char *text, struct explan
 /* Adds "derivative of " and the name of the state, or the name of the variable. */
 static void add_name(const struct instance *instance, size_t offset, struct explanation *to) {
     const struct model *model = instance->model;
-    const size_t from_derivatives = offset - model->derivatives.offset;
-    const bool is_rate = model->expression_count > 0 &&
-                         from_derivatives < model->derivatives.size &&
+    const size_t from_derivatives = offset - model->dx.offset;
+    const bool is_rate = model->expression_count > 0 && from_derivatives < model->dx.size &&
                          offset - model->states.offset >= model->states.size;
     const struct variable *variable =
         variable_at(instance, is_rate ? model->states.offset + from_derivatives : offset);
@@ -230,7 +228,7 @@ static const double *first_not_finite(const double derivatives[], size_t count) 
  * that. */
 static void explain_evaluation(struct instance *instance, struct explanation *to) {
     const struct model *model = instance->model;
-    const size_t count = count_of(model->derivatives);
+    const size_t count = count_of(model->dx);
     double t;
     const double *x = integrator_failure(instance->integrator, &t);
     char *values = instance->first_derivatives;
@@ -248,20 +246,18 @@ static void explain_evaluation(struct instance *instance, struct explanation *to
     if (model->outputs(values, place.t) != STATUS_OK) {
         return;
     }
-    const double *dx = doubles_of(values, model->derivatives);
+    const double *dx = doubles_of(values, model->dx);
     const double *refused = first_not_finite(dx, count);
     if (refused != NULL) {
-        explain_field(&place, model->derivatives.offset + (size_t)(refused - dx) * sizeof *dx,
-                      false, to);
+        explain_field(&place, model->dx.offset + (size_t)(refused - dx) * sizeof *dx, false, to);
         return;
     }
     memset(slopes, 0, model->values_size);
     memcpy(doubles_of(slopes, model->states), dx, model->states.size);
-    const double *ddx = doubles_of(slopes, model->derivatives);
-    if (model->propagate(values, place.t, 1.0, slopes, NULL) == STATUS_OK &&
+    const double *ddx = doubles_of(slopes, model->dx);
+    if (model->derivatives(values, place.t, 1.0, slopes, NULL) == STATUS_OK &&
         (refused = first_not_finite(ddx, count)) != NULL) {
-        explain_field(&place, model->derivatives.offset + (size_t)(refused - ddx) * sizeof *ddx,
-                      true, to);
+        explain_field(&place, model->dx.offset + (size_t)(refused - ddx) * sizeof *ddx, true, to);
     }
 }
 

@@ -326,7 +326,7 @@ static enum status look_ahead(struct instance *instance, size_t points) {
     const struct model *model = instance->model;
     const double *u = doubles_of(instance->memory.values, model->inputs);
     double *x = doubles_of(instance->first_derivatives, model->states);
-    double *dx = doubles_of(instance->second_derivatives, model->derivatives);
+    double *dx = doubles_of(instance->second_derivatives, model->dx);
     memcpy(x, instance->memory.values + model->states.offset, model->states.size);
     enum status status = STATUS_OK;
     for (size_t k = 0; k < points && status == STATUS_OK; k++) {

@@ -120,8 +120,9 @@ enum status domains_outputs(const struct domains *model, struct domains_room roo
     return status;
 }
 
-enum status domains_propagate(const struct domains *model, struct domains_room room,
-                              const void *values, double t, double dt, void *first, void *second) {
+enum status domains_derivatives(const struct domains *model, struct domains_room room,
+                                const void *values, double t, double dt, void *first,
+                                void *second) {
     memcpy(room.values, values, model->values_size);
     if (!update_modes(model, room, values, t)) {
         return STATUS_OK;
@@ -131,7 +132,7 @@ enum status domains_propagate(const struct domains *model, struct domains_room r
         memcpy(room.second, second, model->values_size);
     }
     const enum status status =
-        model->propagate(room.values, t, dt, room.first, second != NULL ? room.second : NULL);
+        model->derivatives(room.values, t, dt, room.first, second != NULL ? room.second : NULL);
     complete_calculated(model, first, room.first);
     if (second != NULL) {
         complete_calculated(model, second, room.second);

@@ -32,7 +32,7 @@ struct domains {
     enum status (*write_indicators)(const void *values, double t, const double x[],
                                     const double u[], double z[]);
     enum status (*outputs)(void *values, double t);
-    enum status (*propagate)(const void *values, double t, double dt, void *first, void *second);
+    enum status (*derivatives)(const void *values, double t, double dt, void *first, void *second);
     enum status (*extend)(const struct series_origin *origin, int first, int last,
                           double row[][SERIES_LENGTH]);
 };
@@ -83,8 +83,8 @@ enum status domains_indicators(const struct domains *model, struct domains_room 
                                double z[]);
 enum status domains_outputs(const struct domains *model, struct domains_room room, void *values,
                             double t);
-enum status domains_propagate(const struct domains *model, struct domains_room room,
-                              const void *values, double t, double dt, void *first, void *second);
+enum status domains_derivatives(const struct domains *model, struct domains_room room,
+                                const void *values, double t, double dt, void *first, void *second);
 
 /* Extends a series from order 0 on, if domains_has_begun is false. */
 enum status domains_extend(const struct domains *model, struct domains_room room,

@@ -204,12 +204,11 @@ struct expression {
 /* ---- The model ------------------------------------------------------------------------------ */
 
 struct model {
-    size_t values_size;       /* bytes of the value structure */
-    struct range parameters;  /* all fields that parameters are bound to */
-    struct range inputs;      /* double[], all inputs */
-    struct range states;      /* double[], all continuous states */
-    struct range derivatives; /* double[], time derivative of each state in the order of states; may
-                                overlap states */
+    size_t values_size;      /* bytes of the value structure */
+    struct range parameters; /* all fields that parameters are bound to */
+    struct range inputs;     /* double[], all inputs */
+    struct range states;     /* double[], all continuous states */
+    struct range dx; /* double[], time derivatives of the states in their order; may overlap */
 
     /* Writes x' = f(t, x, u, p) to dx. A pure function: parameters are read from values, states and
      * inputs only from x and u. t in s, the rest in the units of variables.toml. */
@@ -236,7 +235,7 @@ struct model {
      * second: value structures whose parameters, inputs and states hold the first and second
      * derivatives along the curve; their calculated fields are written. second may be NULL. t in s;
      * dt: derivative of the time along the curve, which is straight in time. */
-    enum status (*propagate)(const void *values, double t, double dt, void *first, void *second);
+    enum status (*derivatives)(const void *values, double t, double dt, void *first, void *second);
 
     /* Returns STATUS_OK if the parameters are consistent; otherwise STATUS_INVALID_PARAMETERS and,
      * in text (size bytes), one line that says what is wrong and what is expected. */

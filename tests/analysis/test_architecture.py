@@ -36,8 +36,8 @@ MAY_INCLUDE = {
     r"src/integrator": ("src/model",),
     r"src/instance": ("src/integrator", "src/model"),
     r"fmu": ("src/model",),
-    r"fmu/component": ("src/instance", "src/model"),
-    r"fmu/fmi\d": ("fmu/component", "src/instance", "src/model"),
+    r"fmu/fmi": ("src/instance", "src/model"),
+    r"fmu/fmi\d": ("fmu/fmi", "src/instance", "src/model"),
     r"models": ("src/model",),
     r"rparm/proof": (),
     r"models/\w+(/equations)?": ("models", "src/model"),
@@ -290,7 +290,7 @@ def project(tmp_path: Path) -> Path:
     """Headers and modules of every folder, with nothing in them."""
     for name in (
         "src/model/model.h", "src/integrator/ode.h", "src/integrator/method.h",
-        "src/instance/instance.h", "src/instance/state.h", "fmu/component/component.h",
+        "src/instance/instance.h", "src/instance/state.h", "fmu/fmi/fmi_instance.h",
         "fmu/fmi2/fmi2_functions.h", "fmu/fmi3/fmi3_calls.h", "models/jet.h",
         "models/rp_manipulator/rp_manipulator.h", "models/rp_trajectory/motion.h",
         "models/rp_plant/rp_plant_model.h", "models/rp_plant/equations/rp_plant.h",
@@ -314,7 +314,7 @@ def write(project: Path, name: str, text: str) -> None:
         ("src/integrator/workspace.c", "sched.h"),
         ("src/instance/history.c", "method.h"),
         ("src/instance/values.c", "cvode/cvode.h"),
-        ("fmu/component/component.c", "state.h"),
+        ("fmu/fmi/fmi_instance.c", "state.h"),
         ("fmu/fmi2/fmi2.c", "fmi3_calls.h"),
         ("fmu/fmi2/fmi2.c", "fmi3Functions.h"),
         ("models/rp_plant/equations/rp_plant.c", "rp_plant_model.h"),

@@ -31,7 +31,7 @@ WORDS_OF_EVENTS = ["indicator_count", "indicator_names"]
 WORDS_OF_EVENTS += [f"{part}_{key}" for part in ("modes", "discrete_states", "discrete_inputs")
                     for key in ("offset", "size")]  # fmt: skip
 WORDS_OF_EVENTS += ["starts_follow", "next_time"]
-WORDS += ["right_hand_side", "jacobian", "band", "series", "outputs", "propagate", "check"]
+WORDS += ["right_hand_side", "jacobian", "band", "series", "outputs", "derivatives", "check"]
 WORDS += ["events"]
 
 
@@ -112,11 +112,11 @@ class Model:
         """Write the calculated fields."""
         self._call("outputs", values, ctypes.c_double(t))
 
-    def propagate(
+    def derivatives(
         self, values: np.ndarray, t: float, dt: float, first: np.ndarray, second: np.ndarray
     ) -> None:
         """Write the calculated fields of first and second derivatives."""
-        self._call("propagate", values, ctypes.c_double(t), ctypes.c_double(dt), first, second)
+        self._call("derivatives", values, ctypes.c_double(t), ctypes.c_double(dt), first, second)
 
     def jacobian(self, values: np.ndarray, t: float) -> np.ndarray:
         """Derivatives of the states' derivatives by the states."""

@@ -94,7 +94,7 @@ def test_the_text_of_a_model_does_not_grow_with_its_arrays(tmp_path: Path) -> No
 
     assert lines(chain(210)) == lines(chain(260)) < 1500
     cells = [TEXTS["CELLS"].replace("300", n) for n in ("100", "150")]
-    first, second = (lines(text, "describe", "propagate", "indicators") for text in cells)
+    first, second = (lines(text, "describe", "derivatives", "indicators") for text in cells)
     assert first == second
 
 

@@ -68,7 +68,7 @@ def test_values_are_those_of_compiled_c(tmp_path: Path) -> None:
         assert min(abs(x - 0.5), abs(x - 0.8), abs(x - 0.75), abs(y - 0.25), abs(x - y)) > h
         for direction in ((1, 0), (0, 1)):
             first = model.values(x=direction[0], y=direction[1])
-            model.propagate(values, 0.0, 0.0, first, model.values())
+            model.derivatives(values, 0.0, 0.0, first, model.values())
             (above, below) = (np.array([x, y]) + s * np.array(direction) for s in (h, -h))
             slope = (c("mixed", *above) - c("mixed", *below)) / (2 * h)
             assert first[model.names.index("d_x")] == pytest.approx(slope, rel=1e-8, abs=1e-9)

@@ -81,7 +81,7 @@ def test_values_and_derivatives_along_a_curve(case: tuple) -> None:
     model.outputs(values, point["time"])
     curves = {n: [v[model.names.index(n)] for v in (values, first, second)] for n in NAMES}
     curves["time"] = [point["time"], dt, 0.0]
-    model.propagate(values, point["time"], dt, first, second)
+    model.derivatives(values, point["time"], dt, first, second)
     for name, text in texts.items():
         function = reference(text)
 
@@ -178,7 +178,7 @@ def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
         values = model.values(x=0.7, p=0.0)
         first, second = (model.values(x=x, p=0.3) for x in (0.2, -0.4))
         model.outputs(values, 0.0)
-        model.propagate(values, 0.0, 1.0, first, second)
+        model.derivatives(values, 0.0, 1.0, first, second)
         series = model.series(values, 0.0, 0.5, np.zeros((1, 4)), 20)
         found.append([values, first, second, model.jacobian(values, 0.0), series])
     for branch, alone in zip(*found, strict=True):
@@ -192,7 +192,7 @@ ENDS = MODELS["derivatives_at_ends"]["of_domains"]
 def test_a_series_with_values_side_by_side_is_the_same(
     case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As large models have it (fmu/equations/c_series.py)."""
+    """As large models have it (fmu/compiler/write/c_series.py)."""
     model, _, point, _ = case
     given = (
         model.values(**point),
@@ -201,11 +201,11 @@ def test_a_series_with_values_side_by_side_is_the_same(
         np.array([[point["u"], 0.3, -0.2, 0.1]]),
         12,
     )
-    monkeypatch.setattr("equations.c_series.FEWEST_IN_PAIRS", WIDE)
+    monkeypatch.setattr("compiler.write.c_series.FEWEST_IN_PAIRS", WIDE)
     text = model.file.text.partition("[outputs]")[0]
     one_by_one = Model(tmp_path, text)
     np.testing.assert_array_equal(one_by_one.series(*given), model.series(*given))
-    monkeypatch.setattr("equations.c_series.WIDE", 0)
+    monkeypatch.setattr("compiler.write.c_series.WIDE", 0)
     wide = Model(tmp_path, text)
     assert "const at)" in (tmp_path / "equations.c").read_text()
     np.testing.assert_allclose(wide.series(*given), model.series(*given), rtol=1e-12, atol=1e-14)
@@ -261,7 +261,7 @@ def test_derivatives_where_plain_rules_give_none(tmp_path: Path) -> None:
         assert np.isfinite(values[at]), rate
         for k, (by, slope) in enumerate(zip("xyp", expected, strict=True)):
             first = model.values(**{f"{by}{i}": 1.0})
-            model.propagate(values, 0.0, 0.0, first, model.values())
+            model.derivatives(values, 0.0, 0.0, first, model.values())
             for found in (first[at], *J[2 * i, 2 * i : 2 * i + 2][k : k + 1]):
                 is_right = found == slope if np.isfinite(slope) else not np.isfinite(found)
                 assert is_right, (rate, by)
@@ -272,7 +272,7 @@ def test_a_series_of_a_power_begins_at_0(
     tmp_path: Path, wide: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of an exponent that is a parameter: a whole one, or half a one of a square."""
-    monkeypatch.setattr("equations.c_series.WIDE", wide)
+    monkeypatch.setattr("compiler.write.c_series.WIDE", wide)
     head = 'name = "M"\n[parameters]\nn = { start = 1 }\n[states]\n'
     text = 'x = { derivative = "2 + time" }\ny = { derivative = "(3 * x)**n" }\n'
     text += 'z = { derivative = "(x * x)**(0.5 + n / 2)" }\n'

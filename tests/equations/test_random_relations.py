@@ -188,7 +188,7 @@ def test_derivatives_are_limits_of_differences(case: tuple) -> None:
         model.outputs(values, point["time"])
         for by in NAMES:
             first, second = model.values(**{by: 1.0}), model.values()
-            model.propagate(values, point["time"], float(by == "time"), first, second)
+            model.derivatives(values, point["time"], float(by == "time"), first, second)
             for name, text in texts.items():
                 slopes, decisions = [], []
                 for h in (1e-5, 5e-6):

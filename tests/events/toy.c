@@ -10,9 +10,9 @@
         .parameters = {offsetof(struct toy##_values, parameter), sizeof(double[3])},               \
         .inputs = {offsetof(struct toy##_values, input), sizeof(double)},                          \
         .states = {offsetof(struct toy##_values, state), sizeof(double[2])},                       \
-        .derivatives = {offsetof(struct toy##_values, v), sizeof(double[2])},                      \
-        .right_hand_side = toy##_rhs, .jacobian = jacobian, .series = &toy##_series,               \
-        .outputs = toy##_outputs, .check_parameters = no_check, .events = &toy##_events,           \
+        .dx = {offsetof(struct toy##_values, v), sizeof(double[2])}, .right_hand_side = toy##_rhs, \
+        .jacobian = jacobian, .series = &toy##_series, .outputs = toy##_outputs,                   \
+        .check_parameters = no_check, .events = &toy##_events,                                     \
     }
 
 /* ---- Ball ----------------------------------------------------------------------------------- */

@@ -4,6 +4,8 @@ import math
 import random
 
 import pytest
+from rparm.fmu_tools.compiler import units
+from rparm.fmu_tools.compiler.expressions.dimensions import ONE, dimension_of, of_exponents, shown
 from rparm.fmu_tools.compiler.expressions.expression import (
     CONDITION,
     FUNCTIONS,
@@ -15,13 +17,6 @@ from rparm.fmu_tools.compiler.expressions.expression import (
     parsed,
     with_kinds,
     written,
-)
-from rparm.fmu_tools.compiler.expressions.units import (
-    ONE,
-    exponents,
-    shown,
-    unit_of,
-    unit_of_exponents,
 )
 
 VALUES = {"x": 0.75, "y": -1.25, "z": 3.0}
@@ -118,10 +113,10 @@ def test_long_texts_take_no_depth() -> None:
 
 
 UNITS = {
-    "m": unit_of_exponents({"kg": 1}),
-    "l": unit_of_exponents({"m": 1}),
-    "omega": unit_of_exponents({"s": -1}),
-    "time": unit_of_exponents({"s": 1}),
+    "m": of_exponents({"kg": 1}),
+    "l": of_exponents({"m": 1}),
+    "omega": of_exponents({"s": -1}),
+    "time": of_exponents({"s": 1}),
     "phi": ONE,
 }
 
@@ -140,7 +135,7 @@ UNITS = {
     ],
 )
 def test_units(text: str, unit: str) -> None:
-    assert shown(unit_of(parse(text), UNITS)) == unit
+    assert shown(dimension_of(parse(text), UNITS)) == unit
 
 
 @pytest.mark.parametrize(
@@ -149,13 +144,19 @@ def test_units(text: str, unit: str) -> None:
 )
 def test_units_that_do_not_fit(text: str, column: int) -> None:
     with pytest.raises(ExpressionError, match=f"^column {column}: "):
-        unit_of(parse(f"{text}"), UNITS, expected=UNITS["time"])
+        dimension_of(parse(f"{text}"), UNITS, expected=UNITS["time"])
 
 
 def test_a_unit_is_a_product_of_symbols() -> None:
-    assert exponents("N.m.s/rad") == {"kg": 1, "m": 2, "s": -1, "rad": -1}
-    assert exponents("V/(A.s)") == {"kg": 1, "m": 2, "s": -4, "A": -2}
-    assert exponents("1") == {}
+    assert units.parsed("N.m.s/rad").exponents == {"kg": 1, "m": 2, "s": -1, "rad": -1}
+    assert units.parsed("V/(A.s)").exponents == {"kg": 1, "m": 2, "s": -4, "A": -2}
+    assert units.parsed("1").exponents == {}
     for text in ("", "kg m", "m/s/s", "x", "m^2", "2", "1.m", "(m)", "m10"):
         with pytest.raises(ValueError):
-            exponents(text)
+            units.parsed(text)
+
+
+def test_files_and_scenarios_have_the_same_degrees() -> None:
+    for i in range(-900, 900):
+        assert units.parsed("deg/s").value(i / 10) == math.radians(i / 10)
+    assert math.copysign(1.0, units.parsed("mm").value(-0.0)) == -1.0

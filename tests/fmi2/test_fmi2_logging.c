@@ -1,7 +1,7 @@
 /* What the FMU logs and when. It writes nowhere else. FMI 2.0, sections 2.1.5 and 2.2.4. */
 #define _POSIX_C_SOURCE 200809L
+#include "fmi_states.h"
 #include "fmu_harness.h"
-#include "fmu_states.h"
 
 #include <math.h>
 #include <stdio.h>

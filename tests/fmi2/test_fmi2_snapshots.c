@@ -3,9 +3,9 @@
  * exact: test_fmi2_rollback.c. */
 #define _POSIX_C_SOURCE 200809L
 #include "each_method.h"
+#include "fmi_states.h"
 #include "fmu_harness.h"
 #include "fmu_sequences.h"
-#include "fmu_states.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -23,7 +23,7 @@ static void step(fmi2Component c, double time) {
 
 /* ---- Every state ---------------------------------------------------------------------------- */
 
-static void get_all_where_allowed(fmi2Component c, const struct fmu_state *state,
+static void get_all_where_allowed(fmi2Component c, const struct fmi_state *state,
                                   struct fmu_values *values) {
     memset(values, 0, sizeof *values);
     if (state->letter != 'I') {
@@ -47,7 +47,7 @@ static void go_elsewhere(fmi2Type type, fmi2Component c, int where) {
     }
 }
 
-static void assert_restored(fmi2Component c, const struct fmu_state *state,
+static void assert_restored(fmi2Component c, const struct fmi_state *state,
                             const struct fmu_values *expected, const char *text) {
     struct fmu_values values;
     get_all_where_allowed(c, state, &values);
@@ -55,7 +55,7 @@ static void assert_restored(fmi2Component c, const struct fmu_state *state,
     fmu_assert_in_state(c, state, 0.0, &messages, text);
 }
 
-static void check_state(fmi2Type type, const struct fmu_state *state) {
+static void check_state(fmi2Type type, const struct fmi_state *state) {
     for (int where = 0; where < 3; where++) {
         struct fmu_values expected;
         const fmi2Component c = fmu_reach(type, state, &messages);
@@ -79,8 +79,8 @@ static void check_state(fmi2Type type, const struct fmu_state *state) {
 
 static void test_every_state_is_restored(void) {
     for (size_t t = 0; t < FMU_COUNT(types); t++) {
-        for (size_t i = 0; i < fmu_states_of(types[t])->count; i++) {
-            check_state(types[t], &fmu_states_of(types[t])->states[i]);
+        for (size_t i = 0; i < fmi_states_of(types[t])->count; i++) {
+            check_state(types[t], &fmi_states_of(types[t])->states[i]);
         }
     }
 }
@@ -90,7 +90,7 @@ static void test_the_time_of_a_failed_step_is_restored(void) {
     fmu_only_in(2, "in FMI 3.0 a failed step leaves the instance as it was");
     double reached = -1.0;
     double restored = -1.0;
-    const struct fmu_state *failed = fmu_state_of(fmi2CoSimulation, 'F');
+    const struct fmi_state *failed = fmi_state_of(fmi2CoSimulation, 'F');
     const fmi2Component c = fmu_reach(fmi2CoSimulation, failed, &messages);
     ASSERT_OK(fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
     fmi2FMUstate saved = fmu_save(c);
@@ -327,10 +327,10 @@ EACH_METHOD static void test_a_small_buffer_is_refused(void) {
 /* ---- Kinds of instances --------------------------------------------------------------------- */
 
 static void check_kind(fmi2Type from, fmi2Type to) {
-    for (size_t i = 0; i < fmu_states_of(from)->count; i++) {
-        const fmi2Component source = fmu_reach(from, &fmu_states_of(from)->states[i], &messages);
+    for (size_t i = 0; i < fmi_states_of(from)->count; i++) {
+        const fmi2Component source = fmu_reach(from, &fmi_states_of(from)->states[i], &messages);
         struct fmu_bytes bytes = fmu_save_bytes(source);
-        const fmi2Component c = fmu_reach(to, fmu_state_of(to, 'M'), &messages);
+        const fmi2Component c = fmu_reach(to, fmi_state_of(to, 'M'), &messages);
         fmi2FMUstate good = fmu_save(c);
         fmi2FMUstate made = NULL;
         const fmi2Status made_status = fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made);

@@ -1,13 +1,13 @@
 /* Which function works in which state: sections 4.2.4 (Co-Simulation) and 3.2.3 (Model Exchange) of
  * FMI 2.0. */
+#include "fmi_states.h"
 #include "fmu_harness.h"
-#include "fmu_states.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <unity.h>
 
-/* The tables of the standard; the letters are those of fmu_states.h. No step is ever pending, so
+/* The tables of the standard; the letters are those of fmi_states.h. No step is ever pending, so
  * that CancelStep never fits. */
 static const struct {
     const char *co_simulation, *model_exchange;
@@ -100,7 +100,7 @@ static char letter_after(fmi2Type type, enum fmu_function function, char letter)
 struct pair {
     fmi2Type type;
     enum fmu_function function;
-    const struct fmu_state *state;
+    const struct fmi_state *state;
     char text[128];
 };
 
@@ -116,7 +116,7 @@ static void assert_works(const struct pair *pair, fmi2Component c) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(expected, call(pair, c), pair->text);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(0, messages.count[fmi2Error], pair->text);
     const char after = letter_after(pair->type, pair->function, pair->state->letter);
-    fmu_assert_in_state(c, fmu_state_of(pair->type, after),
+    fmu_assert_in_state(c, fmi_state_of(pair->type, after),
                         pair->function == FMU_DoStep ? step : 0.0, &messages, pair->text);
 }
 
@@ -124,7 +124,7 @@ static void assert_refused(const struct pair *pair, fmi2Component c) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call(pair, c), pair->text);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi2Error], pair->text);
     fmu_assert_logged(&messages, fmu_name_of(pair->function));
-    fmu_assert_in_state(c, fmu_state_of(pair->type, 'E'), 0.0, &messages, pair->text);
+    fmu_assert_in_state(c, fmi_state_of(pair->type, 'E'), 0.0, &messages, pair->text);
 }
 
 /* A state saved before a refused call undoes it. */
@@ -159,7 +159,7 @@ static void check(const struct pair *pair) {
 }
 
 static void check_all(fmi2Type type) {
-    const struct fmu_states *states = fmu_states_of(type);
+    const struct fmi_states *states = fmi_states_of(type);
     for (size_t i = 0; i < states->count * FMU_FUNCTION_COUNT; i++) {
         struct pair pair = {
             .type = type,

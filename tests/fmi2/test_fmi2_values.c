@@ -1,8 +1,8 @@
 /* Setting and getting values: what is refused and that a refused call changes nothing, what may be
  * set in which mode, what is checked where a mode ends, and how results follow what is set between
  * steps. FMI 2.0, sections 2.1.7, 3.2.3, 4.2.1, 4.2.2 and 4.2.4. */
+#include "fmi_states.h"
 #include "fmu_harness.h"
-#include "fmu_states.h"
 
 #include <limits.h>
 #include <math.h>
@@ -301,7 +301,7 @@ static void check_settable(fmi2Type type, size_t row, char letter) {
                          (fmu_version == 3 && type == fmi2ModelExchange && is_state(reference));
     const double value = is_integer(row) ? 3.0 : 0.5;
     const fmi2Integer integer = 3;
-    const fmi2Component c = fmu_reach(type, fmu_state_of(type, letter), &messages);
+    const fmi2Component c = fmu_reach(type, fmi_state_of(type, letter), &messages);
     const double expected = allowed || letter == 'I' ? value : get(c, row);
     const fmi2Status status = is_integer(row) ? fmu.SetInteger(c, &reference, 1, &integer)
                                               : fmu_try_set(c, reference, value);

@@ -10,7 +10,7 @@ const char *fmu_name_of(enum fmu_function function) {
     return fmu_function_names[function];
 }
 
-static const struct fmu_state of_co_simulation[] = {
+static const struct fmi_state of_co_simulation[] = {
     {'I', "instantiated", FMU_SetupExperiment},
     {'M', "in initialization mode", FMU_ExitInitializationMode},
     {'C', "between steps", FMU_DoStep},
@@ -19,7 +19,7 @@ static const struct fmu_state of_co_simulation[] = {
     {'E', "in the error state", FMU_FUNCTION_COUNT},
 };
 
-static const struct fmu_state of_model_exchange[] = {
+static const struct fmi_state of_model_exchange[] = {
     {'I', "instantiated", FMU_SetupExperiment},
     {'M', "in initialization mode", FMU_ExitInitializationMode},
     {'V', "in event mode", FMU_EnterContinuousTimeMode},
@@ -28,5 +28,5 @@ static const struct fmu_state of_model_exchange[] = {
     {'E', "in the error state", FMU_FUNCTION_COUNT},
 };
 
-const struct fmu_states fmu_co_simulation_states = {6, of_co_simulation};
-const struct fmu_states fmu_model_exchange_states = {6, of_model_exchange};
+const struct fmi_states fmu_co_simulation_states = {6, of_co_simulation};
+const struct fmi_states fmu_model_exchange_states = {6, of_model_exchange};

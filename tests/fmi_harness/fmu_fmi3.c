@@ -455,14 +455,14 @@ const char *fmu_name_of(enum fmu_function function) {
 
 /* ---- States --------------------------------------------------------------------------------- */
 
-static const struct fmu_state of_co_simulation[] = {
+static const struct fmi_state of_co_simulation[] = {
     {'I', "instantiated", FMU_EnterInitializationMode},
     {'M', "in initialization mode", FMU_ExitInitializationMode},
     {'C', "between steps", FMU_DoStep},
     {'T', "terminated", FMU_FUNCTION_COUNT},
 };
 
-static const struct fmu_state of_model_exchange[] = {
+static const struct fmi_state of_model_exchange[] = {
     {'I', "instantiated", FMU_EnterInitializationMode},
     {'M', "in initialization mode", FMU_ExitInitializationMode},
     {'V', "in event mode", FMU_EnterContinuousTimeMode},
@@ -470,5 +470,5 @@ static const struct fmu_state of_model_exchange[] = {
     {'T', "terminated", FMU_FUNCTION_COUNT},
 };
 
-const struct fmu_states fmu_co_simulation_states = {4, of_co_simulation};
-const struct fmu_states fmu_model_exchange_states = {5, of_model_exchange};
+const struct fmi_states fmu_co_simulation_states = {4, of_co_simulation};
+const struct fmi_states fmu_model_exchange_states = {5, of_model_exchange};

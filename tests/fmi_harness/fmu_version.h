@@ -16,18 +16,18 @@ const char *fmu_name_of(enum fmu_function function);
 
 /* ---- States --------------------------------------------------------------------------------- */
 
-struct fmu_state {
+struct fmi_state {
     char letter;
     const char *name;        /* as messages put it */
     enum fmu_function proof; /* works here, but not after an error */
 };
 
-struct fmu_states {
+struct fmi_states {
     size_t count;
-    const struct fmu_state *states;
+    const struct fmi_state *states;
 };
 
-extern const struct fmu_states fmu_co_simulation_states;
-extern const struct fmu_states fmu_model_exchange_states;
+extern const struct fmi_states fmu_co_simulation_states;
+extern const struct fmi_states fmu_model_exchange_states;
 
 #endif

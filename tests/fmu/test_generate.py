@@ -176,7 +176,7 @@ def compile_table(folder: Path, model: str) -> None:
             "src/model",
             "src/integrator",
             "src/instance",
-            "fmu/component",
+            "fmu/fmi",
             "models",
             "models/rp_manipulator",
             "models/rp_plant/equations",

@@ -127,18 +127,18 @@ static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
 static struct model model;
 static struct model_description model_description;
 static bool has_outputs;
-static int propagations_left; /* before one fails */
-static bool is_infinite;      /* what propagations give */
+static int evaluations_left; /* before one fails */
+static bool is_infinite;     /* what derivatives are */
 
 static enum status outputs(void *values, double t) {
     return has_outputs ? oscillator_model.outputs(values, t) : STATUS_NOT_FINITE;
 }
 
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    if (propagations_left-- <= 0) {
+static enum status derivatives(const void *values, double t, double dt, void *first, void *second) {
+    if (evaluations_left-- <= 0) {
         return STATUS_NOT_FINITE;
     }
-    const enum status status = oscillator_model.propagate(values, t, dt, first, second);
+    const enum status status = oscillator_model.derivatives(values, t, dt, first, second);
     if (is_infinite) {
         ((struct oscillator_values *)first)->energy = INFINITY;
     }
@@ -149,11 +149,11 @@ static enum status propagate(const void *values, double t, double dt, void *firs
 static void begin_failing(void) {
     model = oscillator_model;
     model.outputs = outputs;
-    model.propagate = propagate;
+    model.derivatives = derivatives;
     model_description = oscillator_description;
     model_description.model = &model;
     has_outputs = true;
-    propagations_left = 100;
+    evaluations_left = 100;
     is_infinite = false;
     create(&model_description);
     initialize_at(0.0);
@@ -207,16 +207,16 @@ static void test_without_outputs_only_states_are_read(void) {
     assert_works(derive_energy_by_x);
 }
 
-/* Along time the model propagates twice. */
-static void test_derivatives_fail_with_any_propagation(void) {
+/* Along time the model derives twice. */
+static void test_derivatives_fail_with_any_evaluation(void) {
     begin_failing();
     for (int good = 0; good < 2; good++) {
-        propagations_left = good;
+        evaluations_left = good;
         assert_fails(derive_energy, "no derivatives at t = 0.1");
     }
-    propagations_left = 0;
+    evaluations_left = 0;
     assert_fails(derive_energy_by_x, "no derivatives at t = 0.1");
-    propagations_left = 100;
+    evaluations_left = 100;
     assert_works(derive_energy);
     assert_works(derive_energy_by_x);
 }

@@ -64,7 +64,7 @@ def results(model: Model, holds: int, fill: float) -> dict[str, np.ndarray]:
     call(words.outputs, found["outputs"], t)
     for name in ("first", "second"):
         found[name] = np.where(known, 0.25, fill)
-    call(words.propagate, found["outputs"], t, 1.0, found["first"], found["second"])
+    call(words.derivatives, found["outputs"], t, 1.0, found["first"], found["second"])
 
     row_count, _, extend = (ctypes.c_size_t * 3).from_address(words.series)
     rows, inputs = np.full((row_count, LENGTH), fill), source.normal(size=(len(u) + 1, 4))

@@ -149,7 +149,7 @@ def test_rollback_leaves_no_trace(version: str, name: str, method: int | None) -
         running(opened, scenario) as run,
         running(opened, scenario) as other,
     ):
-        saved = run.instance.saved_state()
+        saved = run.instance.snapshot()
         for i in range(min(steps, max(jumps) + AFTER)):
             if i in jumps:
                 again = range(i, min(i + AFTER, steps))

@@ -33,7 +33,7 @@ struct doubles {
 struct subject {
     const struct model *model;
     struct doubles knowns[2];     /* parameters, inputs, states */
-    struct doubles calculated[2]; /* by outputs and propagate */
+    struct doubles calculated[2]; /* by outputs and derivatives */
     struct range counts;          /* int[], by outputs */
     void (*place)(int n); /* makes a point of kind n of random knowns, far from where it changes */
 };
@@ -182,7 +182,7 @@ static double slope(const union point points[9], size_t i) {
 static void check_derivatives(void) {
     static union point values[9], rates[9];
     union point rate = first, curvature = second;
-    ASSERT_OK(model->propagate(&at, now, speed, &rate, &curvature));
+    ASSERT_OK(model->derivatives(&at, now, speed, &rate, &curvature));
     for (int n = 0; n < 9; n++) {
         const double t = (n - 4) * h;
         values[n] = at;
@@ -193,7 +193,7 @@ static void check_derivatives(void) {
             rates[n].all[i] += t * second.all[i];
         }
         ASSERT_OK(model->outputs(&values[n], now + t * speed));
-        ASSERT_OK(model->propagate(&values[n], now + t * speed, speed, &rates[n], NULL));
+        ASSERT_OK(model->derivatives(&values[n], now + t * speed, speed, &rates[n], NULL));
     }
     double scale = 1.0; // of the largest: fields are sums of terms that others show
     for (int k = 0; k < field_count; k++) {
@@ -218,10 +218,10 @@ static void check_what_is_read(void) {
     poison_calculated(&dirty_first);
     poison_calculated(&dirty_second);
     poison_calculated(&alone);
-    ASSERT_OK(model->propagate(&dirty, now, speed, &dirty_first, &dirty_second));
-    ASSERT_OK(model->propagate(&dirty, now, speed, &alone, NULL));
+    ASSERT_OK(model->derivatives(&dirty, now, speed, &dirty_first, &dirty_second));
+    ASSERT_OK(model->derivatives(&dirty, now, speed, &alone, NULL));
     ASSERT_OK(model->outputs(&clean, now));
-    ASSERT_OK(model->propagate(&clean, now, speed, &clean_first, &clean_second));
+    ASSERT_OK(model->derivatives(&clean, now, speed, &clean_first, &clean_second));
     ASSERT_OK(model->outputs(&dirty, now));
     TEST_ASSERT_EQUAL_MEMORY(&clean, &dirty, model->values_size);
     TEST_ASSERT_EQUAL_MEMORY(&clean_first, &dirty_first, model->values_size);
@@ -241,7 +241,7 @@ static union point without_arguments(double x[STATES], double u[INPUTS]) {
 }
 
 /* The right-hand side and the Jacobian take states and inputs from their arguments; bit for bit
- * what outputs and propagate give. A joint that is stuck rests. */
+ * what outputs and derivatives give. A joint that is stuck rests. */
 static void check_integration(void) {
     double x[STATES], u[INPUTS], dx[STATES], J[STATES * STATES];
     const size_t count = model->states.size / sizeof(double);
@@ -250,8 +250,8 @@ static void check_integration(void) {
     ASSERT_OK(model->outputs(&expected, now));
     memset(dx, 0xff, sizeof dx);
     ASSERT_OK(model->right_hand_side(&given, now, x, u, dx));
-    TEST_ASSERT_TRUE(count == 0 || memcmp((char *)&expected + model->derivatives.offset, dx,
-                                          model->derivatives.size) == 0);
+    TEST_ASSERT_TRUE(count == 0 ||
+                     memcmp((char *)&expected + model->dx.offset, dx, model->dx.size) == 0);
     memset(J, 0xff, sizeof J);
     if (count > 0) {
         ASSERT_OK(model->jacobian(&given, now, x, u, J));
@@ -261,9 +261,9 @@ static void check_integration(void) {
         memset(&column, 0, sizeof column);
         const double one = 1.0;
         memcpy((char *)&column + model->states.offset + j * sizeof one, &one, sizeof one);
-        ASSERT_OK(model->propagate(&at, now, 0.0, &column, NULL));
+        ASSERT_OK(model->derivatives(&at, now, 0.0, &column, NULL));
         const double *rate =
-            (const double *)(const void *)((const char *)&column + model->derivatives.offset);
+            (const double *)(const void *)((const char *)&column + model->dx.offset);
         const bool rests =
             model == &rp_plant_model && at.plant.modes.joint[j % 2] == RP_PLANT_STUCK;
         for (size_t i = 0; i < count; i++) {

@@ -54,8 +54,8 @@ static enum status outputs(void *values_pointer, double t) {
 
 /* Product rule, twice, for a = -omega^2 x + gain u and energy = (v^2 + omega^2 x^2) / 2 with omega
  * and gain constant along the curve. */
-static enum status propagate(const void *values_pointer, double t, double dt, void *first_pointer,
-                             void *second_pointer) {
+static enum status derivatives(const void *values_pointer, double t, double dt, void *first_pointer,
+                               void *second_pointer) {
     const struct oscillator_values *p = values_pointer;
     struct oscillator_values *d = first_pointer;
     struct oscillator_values *dd = second_pointer;
@@ -83,12 +83,12 @@ const struct model oscillator_model = {
     .parameters = {offsetof(struct oscillator_values, omega), 2 * sizeof(double)},
     .inputs = {offsetof(struct oscillator_values, u), sizeof(double)},
     .states = {offsetof(struct oscillator_values, x), 2 * sizeof(double)},
-    .derivatives = {offsetof(struct oscillator_values, v), 2 * sizeof(double)},
+    .dx = {offsetof(struct oscillator_values, v), 2 * sizeof(double)},
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .series = &series,
     .outputs = outputs,
-    .propagate = propagate,
+    .derivatives = derivatives,
     .check_parameters = check_parameters,
 };
 

@@ -13,7 +13,7 @@ from rparm import project
 from rparm.report.overview import Entry, forget, read, record, write
 from rparm.report.scenario_page import describe_signal
 from rparm.runs import scenario
-from rparm.runs.inputs import Table
+from rparm.runs.inputs import Polyline
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
 from tests.support.rparm_project import FMUS, MISTAKES, Console, check_near, declared
@@ -198,10 +198,10 @@ def test_files_of_one_name_have_pages_of_their_own(console: Console) -> None:
 
 def test_a_long_table_is_summed_up() -> None:
     points = tuple((float(i), float(i % 3)) for i in range(3))
-    assert describe_signal(Table(points)) == "0 at 0 s, 1 at 1 s, 2 at 2 s, linear in between"
+    assert describe_signal(Polyline(points)) == "0 at 0 s, 1 at 1 s, 2 at 2 s, linear in between"
     many = tuple((i / 10, float(i % 7)) for i in range(50))
     summed = "table of 50 points from 0 to 4.9 s, values from 0 to 6, linear in between"
-    assert describe_signal(Table(many)) == summed
+    assert describe_signal(Polyline(many)) == summed
 
 
 def test_the_page_of_a_file_is_opened(console: Console, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from rparm.errors import CodeError, UserError
 from rparm.fmi.fmu_file import Fmu
-from rparm.runs.inputs import Table
+from rparm.runs.inputs import Polyline
 from rparm.systems import step_control
-from rparm.systems.master import Master, Snapshot
+from rparm.systems.master import Master, SystemSnapshot
 from rparm.systems.python_component import PythonComponent
 from rparm.systems.structure import Connection
 from tests.support.paths import ROOT
@@ -166,7 +166,7 @@ def test_an_algebraic_loop_is_named(oscillator: Fmu) -> None:
 def test_going_back_repeats_bit_for_bit(oscillator: Fmu, inputs: str) -> None:
     with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
         master.advance(0.1)
-        with Snapshot(master) as snapshot:
+        with SystemSnapshot(master) as snapshot:
             snapshot.take()
             first = master.run([0.1, 0.15, 0.3])
             for _ in range(2):
@@ -190,7 +190,7 @@ def test_every_snapshot_is_freed(oscillator: Fmu, monkeypatch: pytest.MonkeyPatc
             monkeypatch.setattr(
                 fmi, name, lambda *arguments, free=free: (freed.append(arguments), free(*arguments))
             )
-        with pytest.raises(RuntimeError), Snapshot(master) as snapshot:
+        with pytest.raises(RuntimeError), SystemSnapshot(master) as snapshot:
             snapshot.take()
             snapshot.take()
             raise RuntimeError
@@ -360,7 +360,7 @@ def python(folder: Path, text: str, name: str = "", **ends: list[str]) -> Python
 
 
 def test_signals_are_held_over_each_step(oscillator: Fmu) -> None:
-    signal = Table(((0.0, 0.0), (0.5, 2.0), (1.0, -1.0)))
+    signal = Polyline(((0.0, 0.0), (0.5, 2.0), (1.0, -1.0)))
     with Master({"a": oscillator}, [], signals={"a.u": signal}) as master:
         master.initialize(3.0, None, {"a": PARAMETERS["a"]})
         rows = master.run(3.0 + np.arange(STEPS + 1) * H)
@@ -391,7 +391,7 @@ def test_python_goes_back_where_it_can_and_is_refused_elsewhere(
 ) -> None:
     with beside(oscillator, python(tmp_path, PID + SAVES)) as master:
         master.advance(0.1)
-        with Snapshot(master) as snapshot:
+        with SystemSnapshot(master) as snapshot:
             snapshot.take()
             first = master.run([0.1, 0.15, 0.3])
             snapshot.restore()
@@ -511,7 +511,7 @@ def test_going_back_over_a_switch_repeats_bit_for_bit(fmus: dict[str, Fmu]) -> N
     with wired(fmus) as master:
         master.initialize(0.0, None, carrying(GRASP))
         master.run(np.arange(5) * STEP_SIZE)
-        with Snapshot(master) as snapshot:
+        with SystemSnapshot(master) as snapshot:
             snapshot.take()
             first = master.run(np.arange(4, 17) * STEP_SIZE)
             snapshot.restore()

@@ -11,7 +11,7 @@ import pytest
 from rparm.errors import UserError, WrongValueError
 from rparm.fmi.model import Variable
 from rparm.runs import scenario
-from rparm.runs.inputs import Sines, Table
+from rparm.runs.inputs import Polyline, Sines
 from rparm.units import HERTZ, SECONDS, duration, typed_quantity, units_of
 from tests.support.rparm_project import FMUS, MISTAKES, NAMES, declared, load
 from tests.support.toy_model import DESCRIPTION, TOY, toy
@@ -162,7 +162,7 @@ def test_a_scenario_takes_units_wherever_it_takes_values(tmp_path: Path) -> None
     assert (run.parameters, run.initial) == ({"l1": 0.5}, {"q1": math.radians(-45)})
     assert run.signals == {
         "tau1": Sines(0.3, ((2.0, 0.5, math.pi / 2),)),
-        "f2": Table(((0.0, 1000.0), (1.0, 2.0))),
+        "f2": Polyline(((0.0, 1000.0), (1.0, 2.0))),
     }
     assert run.questions == ()
     for stop, force, message in (

@@ -124,7 +124,7 @@ static void propagate_linearly(const struct wheel_values *values, struct wheel_v
     d->push = values->is_caught ? d->speed : 0.0;
 }
 
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+static enum status derivatives(const void *values, double t, double dt, void *first, void *second) {
     propagate_linearly(values, first);
     if (second != NULL) {
         propagate_linearly(values, second);
@@ -141,11 +141,11 @@ const struct model wheel_model = {
     .parameters = {offsetof(struct wheel_values, stop), sizeof(double) + sizeof(int)},
     .inputs = {offsetof(struct wheel_values, speed), sizeof(double)},
     .states = {offsetof(struct wheel_values, angle), sizeof(double)},
-    .derivatives = {offsetof(struct wheel_values, rate), sizeof(double)},
+    .dx = {offsetof(struct wheel_values, rate), sizeof(double)},
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .outputs = outputs,
-    .propagate = propagate,
+    .derivatives = derivatives,
     .check_parameters = check_parameters,
     .events = &events,
 };

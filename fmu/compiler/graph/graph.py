@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
 from ..expressions.expression import RELATIONS, Node, in_order, parse
-from .tables import FAR, Table
+from .tables import FAR, LookupTable
 
 ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
 
@@ -127,12 +127,13 @@ class Graph:
 
     known: dict[tuple, Value] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
-    tables: Mapping[str, Table] = field(default_factory=dict)
+    tables: Mapping[str, LookupTable] = field(default_factory=dict)
     functions: Mapping[str, Callable[[list[Value], bool], Value]] = field(default_factory=dict)
     unknowns: dict[Value, Value | None] = field(default_factory=dict)  # by condition
     nodes: list[Node] = field(default_factory=list)  # of a text, for each relation
     segments: dict[str, Segment] = field(default_factory=dict)  # by the names of their leaves
-    looked_up: dict[Value, tuple[Table, list[Value]]] = field(default_factory=dict)  # at instants
+    # at instants
+    looked_up: dict[Value, tuple[LookupTable, list[Value]]] = field(default_factory=dict)
     of_inputs: dict[Value, bool] = field(default_factory=dict)  # of distances
     has_switches: bool = True  # else relations are evaluated with the values
     has_times: bool = False  # without switches: relations of the time with constants are some
@@ -245,14 +246,14 @@ class Graph:
             value = self.value("if", place, element, value)
         return value
 
-    def in_table(self, table: Table, given: list[Value], is_instant: bool) -> Value:
+    def in_table(self, table: LookupTable, given: list[Value], is_instant: bool) -> Value:
         """The value of a table, which `looked_up` knows at an instant."""
         value = self.polynomial(table, given, is_instant)
         if is_instant:
             self.looked_up[value] = table, given
         return value
 
-    def polynomial(self, table: Table, given: list[Value], is_instant: bool) -> Value:
+    def polynomial(self, table: LookupTable, given: list[Value], is_instant: bool) -> Value:
         """The value of a table, by the distance from its segment's origin."""
         places = [self._segment(table, i, x, is_instant) for i, x in enumerate(given)]
         distances = [
@@ -270,7 +271,7 @@ class Graph:
         rest = self.value("+", value, self.value("*", by_y, distances[1]))
         return self.value("+", rest, self.value("*", slope, distances[0]))
 
-    def _segment(self, table: Table, axis: int, x: Value, is_instant: bool) -> Value:
+    def _segment(self, table: LookupTable, axis: int, x: Value, is_instant: bool) -> Value:
         """The segment of a number: it stays between events if the number moves."""
         bounds = table.array("bounds", axis)
         if is_instant or not (self.has_switches and x.moves):

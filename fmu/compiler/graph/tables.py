@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..expressions.expression import finite_number
-from ..expressions.units import Measure
+from ..units import Unit
 
 LARGEST_FILE = 50_000_000  # bytes
 SEPARATORS = ",;\t"  # of columns; between others than commas, a comma may be a decimal point
@@ -34,7 +34,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Table:
+class LookupTable:
     """A table as C needs it.
 
     Attributes
@@ -72,7 +72,7 @@ class Table:
             yield self.array("c", i), dimensions, numbers
 
 
-def read(name: str, given: dict[str, Any], folder: Path, units: Mapping[str, Measure]) -> Table:
+def read(name: str, given: dict[str, Any], folder: Path, units: Mapping[str, Unit]) -> LookupTable:
     """Read a table from its entry; a file's path counts from the folder. units: of x, y and z."""
     kind, outside = given.get("interpolation", "linear"), given.get("outside", "hold")
     for key, value, known in (
@@ -91,11 +91,11 @@ def read(name: str, given: dict[str, Any], folder: Path, units: Mapping[str, Mea
     if len(x) != len(y):
         raise ValueError(f"y: has {len(y)} values, expected {len(x)}, as x has")
     coefficients = _polynomials(x, y, kind)
-    return Table(name, *_with_outside(x, y, coefficients, kind, outside))
+    return LookupTable(name, *_with_outside(x, y, coefficients, kind, outside))
 
 
-def _in_si(values: list[float], unit: Measure | None) -> list[float]:
-    return [unit.in_si(value) for value in values] if unit and unit.is_display else values
+def _in_si(values: list[float], unit: Unit | None) -> list[float]:
+    return [unit.value(value) for value in values] if unit and unit.is_display else values
 
 
 # ---- Values --------------------------------------------------------------------------------------
@@ -271,7 +271,7 @@ def _with_outside(
     return (_held(x),), tuple(zip(below, *inside, above, strict=True))
 
 
-def _grid(name: str, given: dict[str, Any], outside: str, units: Mapping[str, Measure]) -> Table:
+def _grid(name: str, given: dict[str, Any], outside: str, units: Mapping[str, Unit]) -> LookupTable:
     """Return a bilinear table; z has a row for each x."""
     if outside == "error":
         raise ValueError("outside: a table of two arguments holds or extends")
@@ -295,7 +295,7 @@ def _grid(name: str, given: dict[str, Any], outside: str, units: Mapping[str, Me
             by_y = (z[i][b] - z[i][j]) / high if high else 0.0
             both = (z[a][b] - z[a][j] - z[i][b] + z[i][j]) / (wide * high) if wide and high else 0.0
             cells.append((z[i][j], by_x, by_y, both))
-    return Table(name, axes, tuple(zip(*cells, strict=True)))
+    return LookupTable(name, axes, tuple(zip(*cells, strict=True)))
 
 
 def _held(x: list[float]) -> Axis:

@@ -11,7 +11,7 @@ from pycparser import c_ast
 
 from ..graph.graph import Graph, Value
 from .text import NO_TYPES, Program, refused
-from .values import Choice, Conditions, Known, Table
+from .values import Cases, Choice, Conditions, Known
 
 REAL, DOUBLE, INT, BOOL, VOID = "real", "double", "int", "bool", "void"
 NAMES = {"double": DOUBLE, "int": INT, "_Bool": BOOL, "void": VOID}
@@ -243,7 +243,7 @@ class Memory:
     ) -> list[tuple[Address, Value | None]]:
         """Return addresses with the conditions under which they are meant; None: always."""
         places = self.conditions.simplified(places, known)
-        if isinstance(places, Table):
+        if isinstance(places, Cases):
             places = self.conditions.as_choice(places, known)
         if not isinstance(places, Choice):
             return [(places, condition)]
@@ -259,7 +259,7 @@ class Memory:
     def load(self, places: Any, state: State, node: c_ast.Node) -> tuple[Any, Any]:
         """Read type and value at an address, or at choices of addresses."""
         places = self.conditions.simplified(places, state.known)
-        if isinstance(places, Table):
+        if isinstance(places, Cases):
             places = self.conditions.as_choice(places, state.known)
         if isinstance(places, Choice):
             kind, first = self.load(places.first, state, node)

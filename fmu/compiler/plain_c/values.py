@@ -23,7 +23,7 @@ MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!="}
 
 
 @dataclass(frozen=True)
-class Table:
+class Cases:
     """Results for all values of an integer leaf; None: the leaf itself, of unknown values."""
 
     leaf: Value
@@ -58,13 +58,13 @@ class Conditions:
         self.domains: dict[Value, frozenset[int]] = {}
         self.true, self.false = graph.number(1.0), graph.number(0.0)
 
-    def leaf(self, name: str, domain: tuple[int, ...] | None) -> Table:
+    def leaf(self, name: str, domain: tuple[int, ...] | None) -> Cases:
         """Return a whole number from outside."""
         leaf = self.graph.value("integer", name=name)
         if domain is None:
-            return Table(leaf, None)
+            return Cases(leaf, None)
         self.domains[leaf] = frozenset(domain)
-        return Table(leaf, tuple((value, value) for value in domain))
+        return Cases(leaf, tuple((value, value) for value in domain))
 
     # ---- Conditions ------------------------------------------------------------------------------
 
@@ -220,7 +220,7 @@ class Conditions:
             if condition.op != "number":
                 return value
             value = value.first if condition.number else value.second
-        if isinstance(value, Table):
+        if isinstance(value, Cases):
             possible = known.sets.get(value.leaf)
             if value.results is None:
                 return next(iter(possible)) if possible and len(possible) == 1 else value
@@ -229,7 +229,7 @@ class Conditions:
                 results = tuple(pair for pair in results if pair[0] in possible)
             if len({result for _, result in results}) == 1:
                 return results[0][1]
-            return Table(value.leaf, results)
+            return Cases(value.leaf, results)
         return value
 
     def choice(self, condition: Value, first: Any, second: Any) -> Any:
@@ -243,11 +243,11 @@ class Conditions:
     def each(self, function: Callable[[Any, Known], Any], value: Any, known: Known) -> Any:
         """Apply a function to each number or pointer that a value may be."""
         value = self.simplified(value, known)
-        if isinstance(value, Table) and value.results is not None:
+        if isinstance(value, Cases) and value.results is not None:
             results = tuple((at, function(result, known)) for at, result in value.results)
             if all(isinstance(result, int) for _, result in results):
-                return self.simplified(Table(value.leaf, results), known)
-            value = self.as_choice(Table(value.leaf, results), known)
+                return self.simplified(Cases(value.leaf, results), known)
+            value = self.as_choice(Cases(value.leaf, results), known)
             return value
         if isinstance(value, Choice):
             yes = self.assume(value.condition, True, known)
@@ -261,7 +261,7 @@ class Conditions:
             )
         return function(value, known)
 
-    def as_choice(self, table: Table, known: Known) -> Any:
+    def as_choice(self, table: Cases, known: Known) -> Any:
         """Turn a table into choices between its results."""
         groups: dict[Any, set[int]] = {}
         for at, result in table.results or ():
@@ -275,7 +275,7 @@ class Conditions:
     def truth(self, value: Any, known: Known) -> Value:
         """Return the condition that a whole number is not 0."""
         value = self.simplified(value, known)
-        if isinstance(value, Table):
+        if isinstance(value, Cases):
             if value.results is None:
                 return self.resolve(self.no(self._compare("==", value.leaf, 0)), known)
             holds = frozenset(at for at, result in value.results if result)
@@ -295,9 +295,9 @@ class Conditions:
     def compare(self, op: str, left: Any, right: Any, known: Known) -> Any:
         """Compare two whole numbers; return 1 or 0 as a whole number."""
         left, right = self.simplified(left, known), self.simplified(right, known)
-        if isinstance(right, Table) and isinstance(left, int):
+        if isinstance(right, Cases) and isinstance(left, int):
             op, left, right = MIRRORED[op], right, left
-        if isinstance(left, Table) and left.results is None and isinstance(right, int):
+        if isinstance(left, Cases) and left.results is None and isinstance(right, int):
             negated = op == "!="
             condition = self._compare("==" if negated else op, left.leaf, right)
             condition = self.resolve(condition, known)
@@ -313,14 +313,14 @@ class Conditions:
             return self.each(lambda b, _: function(a, b), right, known)
 
         left = self.simplified(left, known)
-        if isinstance(left, Table) and not isinstance(self.simplified(right, known), int):
+        if isinstance(left, Cases) and not isinstance(self.simplified(right, known), int):
             left = self.as_choice(left, known)
         return self.each(of_left, left, known)
 
     def real(self, value: Any, known: Known) -> Value:
         """Convert a whole number to a real one."""
         value = self.simplified(value, known)
-        if isinstance(value, Table):
+        if isinstance(value, Cases):
             if value.results is None or all(at == result for at, result in value.results):
                 return value.leaf
             value = self.as_choice(value, known)

@@ -26,8 +26,8 @@ from ..expressions.expression import (
     in_order,
     parse,
 )
-from ..expressions.units import Measure, measured
-from ..graph.tables import Table
+from ..graph.tables import LookupTable
+from ..units import Unit, parsed
 from .code import CodeFile
 
 FOLLOWS = "calculated"  # section of parameters that follow from others
@@ -186,9 +186,9 @@ class ModelFile:
     text: str
     reserved: set[str]  # names that it must not give
     sizes: dict[str, int] = field(default_factory=dict)
-    units: dict[str, Measure] = field(default_factory=dict)  # of [units]
+    units: dict[str, Unit] = field(default_factory=dict)  # of [units]
     functions: dict[str, Function | Lookup] = field(default_factory=dict)
-    tables: dict[str, Table] = field(default_factory=dict)
+    tables: dict[str, LookupTable] = field(default_factory=dict)
     code: CodeFile | None = None
     header: Any = None  # of its struct of values, if it has C
     sources: list[Path] = field(default_factory=list)  # the files of equations, included ones first
@@ -235,9 +235,9 @@ class ModelFile:
                 raise ModelFileError(f"the file has more than {MOST_OPERATIONS} operations")
         return Expression(place, text, tree, *more, **options)
 
-    def measured(self, unit: str) -> Measure:
+    def unit(self, unit: str) -> Unit:
         """Return a unit, which the file or SI has; ValueError if none has it."""
-        return self.units[unit] if unit in self.units else measured(unit)
+        return self.units[unit] if unit in self.units else parsed(unit)
 
     @property
     def files(self) -> list[Path]:

@@ -14,6 +14,7 @@ from typing import Any
 
 from declaration.load import shown
 
+from ..expressions.dimensions import dimension_of, of_exponents
 from ..expressions.expression import (
     CONDITION,
     CONSTANTS,
@@ -24,11 +25,12 @@ from ..expressions.expression import (
     Lookup,
     Node,
     in_order,
+    table_unit,
     with_kinds,
     with_names,
 )
-from ..expressions.units import ANGLE, BASE, Measure, table_unit, unit_of, unit_of_exponents
 from ..graph.tables import read as table_of
+from ..units import ANGLE, BASE, Unit
 from . import header, keys, terminals
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
@@ -80,7 +82,7 @@ def read_tables(source: Source, solver_names: Iterable[str]) -> ModelFile:
     for symbol, given in head.get("units", {}).items():
         with placed("[units]", shown(symbol)):
             known = keys.entries(given, (*BASE, ANGLE), what="base unit")
-            file.units[symbol] = Measure(known, base=symbol)
+            file.units[symbol] = Unit(known, base=symbol)
     for name, entry in head.get("tables", {}).items():
         _read_table(file, name, entry)
     if "code" in head:
@@ -168,7 +170,7 @@ def _read_table(file: ModelFile, name: str, entry: object) -> None:
             if key not in columns:
                 wanted = f"expected {', '.join(columns)}"
                 raise ModelFileError(f"unit: unknown key {shown(key)}, {wanted}")
-            measures[key] = file.measured(units[key])
+            measures[key] = file.unit(units[key])
             axis = "" if key == columns[-1] else columns.index(key)
             file.table_units[table_unit(name, axis)] = measures[key].exponents
         file.tables[name] = table_of(name, given, file.path.parent, measures)
@@ -202,7 +204,7 @@ def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
                     raise ModelFileError("unit: expected units of arguments, too: { x = 'm' }")
                 units = {table_unit(name, order.index(a)): u for a, u in arguments.items()}
                 units |= {table_unit(name): given.get("unit", "1")}
-                file.table_units |= {k: file.measured(u).exponents for k, u in units.items()}
+                file.table_units |= {k: file.unit(u).exponents for k, u in units.items()}
             if "value" in given:
                 own = _function(file, name, arguments, given["value"], bool(units))
                 file.functions[name] = own
@@ -225,10 +227,10 @@ def _function(
             raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
     body = with_kinds(value.tree)
     if has_units:
-        units = {key: unit_of_exponents(found) for key, found in file.table_units.items()}
+        units = {key: of_exponents(found) for key, found in file.table_units.items()}
         units |= {a: units[table_unit(name, i)] for i, a in enumerate(arguments)}
         with placed("value"):
-            unit_of(body, units, units[table_unit(name)])
+            dimension_of(body, units, units[table_unit(name)])
     return Function((*arguments,), body, name=name if has_units else "")
 
 
@@ -342,7 +344,7 @@ def _set_unit(variable: Variable, file: ModelFile) -> None:
     if not variable.is_real:
         return
     with placed("unit"):
-        unit = file.measured(variable.unit or "1")
+        unit = file.unit(variable.unit or "1")
     variable.exponents = unit.exponents
     if not unit.is_display:
         return
@@ -351,7 +353,7 @@ def _set_unit(variable: Variable, file: ModelFile) -> None:
     variable.unit = unit.base
     for key in keys.NUMBERS:
         if (number := getattr(variable, key)) is not None:
-            setattr(variable, key, unit.in_si(number, key == "nominal"))
+            setattr(variable, key, unit.value(number, key == "nominal"))
 
 
 def _check_name(name: str, file: ModelFile) -> None:

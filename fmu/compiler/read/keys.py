@@ -18,7 +18,7 @@ from ..expressions.expression import (
     Kind,
     finite_number,
 )
-from ..expressions.units import ANGLE, BASE
+from ..units import ANGLE, BASE
 from .content import (
     BOOLEAN,
     COUNTS,

@@ -6,6 +6,8 @@ from graphlib import CycleError, TopologicalSorter
 
 from declaration.load import shown
 
+from ..expressions import dimensions
+from ..expressions.dimensions import Dimension, dimension_of, of_exponents, times
 from ..expressions.expression import (
     CONDITION,
     CONSTANTS,
@@ -19,11 +21,10 @@ from ..expressions.expression import (
     with_kinds,
 )
 from ..expressions.hints import meant
-from ..expressions.units import BASE, Unit, times, unit_of, unit_of_exponents
-from ..expressions.units import shown as unit_shown
+from ..units import BASE
 from .content import FOLLOWS, OPTIONS, SWITCHES, Expression, ModelFile, ModelFileError, placed
 
-SECOND = unit_of_exponents({"s": 1})
+SECOND = of_exponents({"s": 1})
 SHORTEST = 1e-12  # s, of periods
 MOST_COMPARED = 1000  # names that may have been meant
 
@@ -186,9 +187,9 @@ def _known_number(expression: Expression, values: Mapping[str, float]) -> float 
 def _check_units(file: ModelFile) -> None:
     """Check that units fit, and find the units of [where]."""
     declared = [v for v in file.variables.values() if v.section != "where" or v.unit or v.display]
-    units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
+    units = {v.name: of_exponents(v.exponents) for v in declared} | {"time": SECOND}
     bare = [v.name for v in declared if v.is_real and not (v.unit or v.display)]
-    units |= {key: unit_of_exponents(found) for key, found in file.table_units.items()}
+    units |= {key: of_exponents(found) for key, found in file.table_units.items()}
     for state in file.of("states"):
         units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
     for expression in file.order:
@@ -197,7 +198,7 @@ def _check_units(file: ModelFile) -> None:
             if expression.is_rate:
                 expected = times(expected, SECOND, -1)
             try:
-                unit = unit_of(expression.tree, units, expected)
+                unit = dimension_of(expression.tree, units, expected)
             except ExpressionError as error:
                 read = sorted(names(expression.tree).intersection(bare))
                 hint = f"; without a unit: {', '.join(read)}" if read else ""
@@ -211,9 +212,10 @@ def _check_units(file: ModelFile) -> None:
             variable.exponents = _whole(units[variable.name])
 
 
-def _whole(unit: Unit) -> dict[str, int]:
+def _whole(unit: Dimension) -> dict[str, int]:
     if any(exponent.denominator > 1 for exponent in unit):
+        shown_unit = dimensions.shown(unit)
         raise ModelFileError(
-            f"has unit {unit_shown(unit)}, whose exponents are no whole numbers: use its square"
+            f"has unit {shown_unit}, whose exponents are no whole numbers: use its square"
         )
     return {base: int(exponent) for base, exponent in zip(BASE, unit, strict=True)}

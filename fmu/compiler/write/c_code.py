@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..expressions.expression import RELATIONS, in_order, written
 from ..graph.graph import CONDITIONS, LEAVES, MOST_COUNTED, Value
-from ..graph.tables import Table
+from ..graph.tables import LookupTable
 from ..read.content import Expression
 
 # operations as C writes them; a function is written as its call
@@ -45,7 +45,7 @@ def text(value: str) -> str:
     return '"' + "".join(_character(byte) for byte in value.encode()) + '"'
 
 
-def shortened(name: str, expression: Expression, tables: Mapping[str, Table]) -> str:
+def shortened(name: str, expression: Expression, tables: Mapping[str, LookupTable]) -> str:
     """A string of C of an assignment, in one line; indexes have their values.
 
     Limits follow, beyond which it is not finite.

@@ -112,7 +112,7 @@ def _ranges(file: ModelFile) -> dict[str, list[str]]:
         section: [file.fields.value(v.name) for v in file.of(section)]
         for section in ("parameters", "inputs", "states")
     }
-    return ranges | {"derivatives": [file.fields.rate(state.name) for state in file.of("states")]}
+    return ranges | {"dx": [file.fields.rate(state.name) for state in file.of("states")]}
 
 
 def _options(file: ModelFile) -> list[str]:
@@ -216,7 +216,7 @@ def _domains(
         names = ("domains_header", "domains_declared", "domains")
         return {"in_domain": "", **{name: [] for name in names}}
     ranges = _ranges(file)
-    calculated = ranges["derivatives"] + [file.fields.value(v.name) for v in file.calculated_reals]
+    calculated = ranges["dx"] + [file.fields.value(v.name) for v in file.calculated_reals]
     groups = {key: ranges[key] for key in ("states", "inputs")}
     groups |= {"calculated": calculated, "indicators": list(events.indicators())}
     distances = {f"distance[{i}]": r.distance for i, r in enumerate(events.relations)}
@@ -271,7 +271,7 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
     first, second = rolled(curve.lines[:split], curve.lines[split:])
     is_long = len(first) + len(second) >= LONG
     return {
-        "storage_of_propagate": "SELDOM_CALLED static" if is_long else "static",
+        "storage_of_derivatives": "SELDOM_CALLED static" if is_long else "static",
         "started": _at_start(file, "d", dict(zip(started, start_firsts, strict=True))),
         "started_twice": _at_start(file, "dd", dict(zip(started, start_seconds, strict=True))),
         "outputs": rolled(outputs.lines)[0],

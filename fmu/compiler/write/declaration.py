@@ -3,20 +3,20 @@
 import re
 import string
 from collections.abc import Collection, Iterable
+from pathlib import Path
 from typing import Any
 
-from declaration.load import UNITS
 from declaration.load import read as read_declaration
 
 from ..expressions.expression import CONDITION, WHOLE, in_order
-from ..expressions.units import shown
 from ..graph.graph import MOVING, Relation, Value
 from ..read.content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
 from ..read.keys import NUMBERS
+from ..units import STANDARD, parsed, shown
 from . import c_events, c_model
 from .c_events import INDICATOR
 
-INSTANCE = UNITS.parents[2] / "src" / "instance"
+INSTANCE = Path(__file__).resolve().parents[3] / "src" / "instance"
 TIME = INSTANCE / "time_variable.toml"
 SOLVER = INSTANCE / "solver_variables.toml"
 EVENTS = INSTANCE / "event_variables.toml"
@@ -85,8 +85,7 @@ def generated(file: ModelFile) -> dict[str, str]:
 def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     """Write a variables.toml (declaration/schema.py) as nested dictionaries."""
     relations, indicators, states = file.graph.relations, _indicators(file), file.of("states")
-    standard = {name: unit.exponents for name, unit in read_declaration(UNITS).units.items()}
-    units = dict(standard)  # those that are declared here come to it
+    units = {name: parsed(name).exponents for name in STANDARD}  # further ones come to it
     tables = {v.name: _entries_of(v, file, units) for v in file.variables.values()}
     for state in _without_derivative(file):
         rate = state.exponents | {"s": state.exponents.get("s", 0) - file.has_units}
@@ -129,7 +128,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "include": [str(path) for path in includes],
         "model": model,
         "experiment": {"start": 0.0} | file.experiment,
-        "units": {name: units[name] for name in units if name not in standard},
+        "units": {name: units[name] for name in units if name not in STANDARD},
         "variables": {
             name: {"reference": references[name, kind], **tables[name]}
             for name, kind in sorted(keys(file), key=lambda key: key[0] in helpers)

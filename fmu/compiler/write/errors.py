@@ -9,7 +9,7 @@ from itertools import product
 
 from ..expressions.expression import in_order
 from ..graph.graph import CONDITIONS, Graph, Value
-from ..graph.tables import Table
+from ..graph.tables import LookupTable
 from .c_code import Code, Leaves, formula
 
 NONE = "0.0"
@@ -84,7 +84,7 @@ class Errors:
         parts = [part for part in parts if part != NONE]
         return " + ".join([*parts, f"{ROUNDING} * fabs({y})"])
 
-    def _in_table(self, table: Table, corner: Sequence[str]) -> str:
+    def _in_table(self, table: LookupTable, corner: Sequence[str]) -> str:
         """Return the value of a table for arguments in C."""
         given = [self.graph.value("parameter", name=f"({at})") for at in corner]
         self.code.known |= {x: x.name for x in given}  # in brackets no name of the file

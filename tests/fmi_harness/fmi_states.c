@@ -1,4 +1,4 @@
-#include "fmu_states.h"
+#include "fmi_states.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -152,12 +152,12 @@ fmi2Status fmu_call(enum fmu_function function, fmi2Component c, double now, dou
 
 /* ---- States --------------------------------------------------------------------------------- */
 
-const struct fmu_states *fmu_states_of(fmi2Type type) {
+const struct fmi_states *fmi_states_of(fmi2Type type) {
     return type == fmi2CoSimulation ? &fmu_co_simulation_states : &fmu_model_exchange_states;
 }
 
-const struct fmu_state *fmu_state_of(fmi2Type type, char letter) {
-    const struct fmu_state *state = fmu_states_of(type)->states;
+const struct fmi_state *fmi_state_of(fmi2Type type, char letter) {
+    const struct fmi_state *state = fmi_states_of(type)->states;
     while (state->letter != letter) {
         state++;
     }
@@ -169,7 +169,7 @@ static void fail_step(fmi2Component c) {
     ASSERT_DISCARD(fmu.DoStep(c, 0.0, 10.0, fmi2True));
 }
 
-fmi2Component fmu_reach(fmi2Type type, const struct fmu_state *state, struct fmu_log *log) {
+fmi2Component fmu_reach(fmi2Type type, const struct fmi_state *state, struct fmu_log *log) {
     const fmi2Component c = fmu_instantiate_as(type, log, false);
     if (state->letter == 'F') {
         fmu_set_integer(c, RP_MANIPULATOR_max_internal_steps, 1);
@@ -194,7 +194,7 @@ fmi2Component fmu_reach(fmi2Type type, const struct fmu_state *state, struct fmu
     return c;
 }
 
-void fmu_assert_in_state(fmi2Component component, const struct fmu_state *state, double now,
+void fmu_assert_in_state(fmi2Component component, const struct fmi_state *state, double now,
                          struct fmu_log *log, const char *message) {
     if (state->proof != FMU_FUNCTION_COUNT) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu_call(state->proof, component, now, 0.01),
