@@ -223,7 +223,7 @@ def prover_of(path: Path) -> Prover:
         return Prover(_motion(path))
     subject = scenarios.subject_of(path)
     if subject.is_dir():
-        return of_folder(subject)
+        return of_folder(subject, path)
     if subject.suffix.lower() == building.EQUATIONS:
         return Prover(_motion(subject))
     with zipfile.ZipFile(subject) as archive, temporary_folder() as folder:
@@ -242,14 +242,14 @@ def prover_of(path: Path) -> Prover:
             raise UserError(f"{path}: {way_out}: {error}") from error
 
 
-def of_folder(folder: Path) -> Prover:
-    """Load the prover of one of the project's models; UserError if it has none."""
+def of_folder(folder: Path, asking: Path | None = None) -> Prover:
+    """Load the prover of one of the project's models, for a scenario; UserError if it has none."""
     known, file = provers(), folder / f"{folder.name}{building.EQUATIONS}"
     if folder.name in known:
         return known[folder.name]
     if not is_file(file):
         expected = f"expected a model whose motion can be proven ({', '.join(known) or 'none'})"
-        raise UserError(f"{expected}, got {folder.name}")
+        raise UserError(f"{asking or folder}: {expected}, got {folder.name}")
     return Prover(_motion(file))
 
 
