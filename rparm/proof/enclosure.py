@@ -223,7 +223,7 @@ def prover_of(path: Path) -> Prover:
         return Prover(_motion(path))
     subject = scenarios.subject_of(path)
     if subject.is_dir():
-        return of_folder(subject, path)
+        return _of_folder(subject, path)
     if subject.suffix.lower() == building.EQUATIONS:
         return Prover(_motion(subject))
     with zipfile.ZipFile(subject) as archive, temporary_folder() as folder:
@@ -242,19 +242,19 @@ def prover_of(path: Path) -> Prover:
             raise UserError(f"{path}: {way_out}: {error}") from error
 
 
-def of_folder(folder: Path, asking: Path | None = None) -> Prover:
+def _of_folder(folder: Path, asking: Path) -> Prover:
     """Load the prover of one of the project's models, for a scenario; UserError if it has none."""
     known, file = provers(), folder / f"{folder.name}{building.EQUATIONS}"
     if folder.name in known:
         return known[folder.name]
     if not is_file(file):
         expected = f"expected a model whose motion can be proven ({', '.join(known) or 'none'})"
-        raise UserError(f"{asking or folder}: {expected}, got {folder.name}")
+        raise UserError(f"{asking}: {expected}, got {folder.name}")
     return Prover(_motion(file))
 
 
 def provers() -> dict[str, Prover]:
-    """Load all provers of the project's models by their folders' names."""
+    """Load the provers of models that the build has made, by the names of their folders."""
     files = {name: project.motion_file(name) for name in project.models()}
     return {
         name: Prover(json.loads(file.read_bytes()), with_outputs=True)

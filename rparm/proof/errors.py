@@ -12,7 +12,7 @@ from rparm.errors import UserError, hint
 from rparm.files import from_here
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES
-from rparm.proof.enclosure import Enclosure, Progress, of_folder
+from rparm.proof.enclosure import Enclosure, Progress, provers
 from rparm.runs import comparison, simulation
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
@@ -132,13 +132,15 @@ def errors_of_run(
     So it is without a prover, where a proof does not come to the end or takes more than
     `LONGEST_RUN` s, and for more than `most_steps` communication steps.
     """
-    folder = project.models().get(scenario.model)
-    if folder is None or len(scenario.times) > most_steps + 1:
+    if scenario.model not in project.models() or len(scenario.times) > most_steps + 1:
         return None
     try:
-        program = replace(of_folder(folder), with_outputs=False)
-        enclosure = program.enclose(scenario, seconds=LONGEST_RUN)
-    except UserError:  # is none of equations, or takes too long
+        program = provers().get(scenario.model)
+        if program is None:
+            return None
+        states_only = replace(program, with_outputs=False)
+        enclosure = states_only.enclose(scenario, seconds=LONGEST_RUN)
+    except UserError:  # takes too long, or what proves cannot be unpacked
         return None
     if enclosure.stopped is not None:
         return None
