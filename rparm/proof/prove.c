@@ -88,27 +88,6 @@ static bool read_node(struct model *model, int i) {
     return read;
 }
 
-/* By the rates, until nothing is new. */
-static void find_dependencies(struct model *model) {
-    for (bool found = true; found;) {
-        found = false;
-        for (int i = 0; i < model->of_rates; i++) {
-            const struct node *node = model->nodes + i;
-            const bool is_state = node->operation == STATE;
-            const int first = is_state ? model->rate[node->first] : node->first;
-            for (int d = 0; d < model->states; d++) {
-                bool *depends = model->depends + (size_t)i * (size_t)model->states + d;
-                const bool now =
-                    *depends || (is_state && node->first == d) ||
-                    (node->operation != TIME && node->moves && depends_on(model, first, d)) ||
-                    (node->second >= 0 && depends_on(model, node->second, d));
-                found = found || now != *depends;
-                *depends = now;
-            }
-        }
-    }
-}
-
 static bool series_create(struct series *series, const struct model *model, int directions) {
     const size_t count = (size_t)model->count;
     series->model = model;
@@ -124,7 +103,8 @@ static bool read_model(struct prover *prover, int starts[]) {
     char word[WORD];
     int sizes[7];
     bool read = read_name("model", word) && read_counts(sizes, 7, MOST_NODES);
-    if (!read || sizes[3] < 1 || sizes[3] > MOST_STATES || sizes[0] < sizes[3]) {
+    if (!read || sizes[3] < 1 || sizes[3] > MOST_STATES || sizes[0] < sizes[3] ||
+        sizes[1] > sizes[2] || sizes[2] > sizes[0]) {
         return false;
     }
     *model = (struct model){.count = sizes[0],
@@ -139,9 +119,8 @@ static bool read_model(struct prover *prover, int starts[]) {
     model->guard = calloc((size_t)model->guards + 1, sizeof(int));
     model->positive = calloc((size_t)model->guards + 1, sizeof(bool));
     model->input = calloc((size_t)model->inputs + 1, sizeof(struct ball));
-    model->depends = calloc((size_t)model->count * (size_t)model->states, sizeof(bool));
     read = model->nodes != NULL && model->output != NULL && model->guard != NULL &&
-           model->positive != NULL && model->input != NULL && model->depends != NULL &&
+           model->positive != NULL && model->input != NULL &&
            series_create(&prover->centre, model, 0) &&
            series_create(&prover->hull, model, model->states);
     for (int i = 0; i < model->count && read; i++) {
@@ -155,9 +134,6 @@ static bool read_model(struct prover *prover, int starts[]) {
         int positive = 0;
         read = read_counts(&positive, 1, 2);
         model->positive[i] = positive == 1;
-    }
-    if (read) {
-        find_dependencies(model);
     }
     for (int k = 1; k < ORDERS; k++) {
         prover->per_order[k] = ball_quotient(ONE, ball_exact(k));

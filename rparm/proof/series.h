@@ -33,7 +33,6 @@ struct model {
     int *output;           /* of each output, */
     int *guard;            /* and of what must not become 0: where it does, an event comes, */
     bool *positive;        /* so that each is above or below 0 */
-    bool *depends;         /* [node][state]: on the state at the origin */
     struct ball *input;    /* over a communication step */
 };
 
@@ -49,11 +48,6 @@ struct series {
 
 static struct ball *series_row(const struct series *s, int direction, int node) {
     return s->rows + ((size_t)direction * (size_t)s->model->count + (size_t)node) * ORDERS;
-}
-
-/* True where a node has a derivative by a state at the origin. */
-static bool depends_on(const struct model *model, int node, int state) {
-    return model->depends[(size_t)node * (size_t)model->states + (size_t)state];
 }
 
 /* True if a ball bounds its numbers. */
@@ -158,7 +152,7 @@ static struct ball node_derivative(const struct series *s, int i, int k, int d) 
     const int first = node->first, second = node->second >= 0 ? node->second : first;
     const struct ball *x = series_row(s, 0, first), *dx = series_row(s, 1 + d, first);
     const struct ball *y = series_row(s, 0, second), *dy = series_row(s, 1 + d, second);
-    const bool by_x = depends_on(model, first, d), by_y = depends_on(model, second, d);
+    const bool by_x = nodes[first].moves, by_y = nodes[second].moves;
     struct ball sum = ball_exact(0.0);
     switch (node->operation) {
     case SUM:
@@ -168,15 +162,15 @@ static struct ball node_derivative(const struct series *s, int i, int k, int d) 
     case NEGATIVE:
         return ball_negative(dx[k]);
     case PRODUCT:
-        sum = by_x ? product_of(dx, y, k, nodes[second].moves) : sum;
-        return by_y ? ball_sum(sum, product_of(dy, x, k, nodes[first].moves)) : sum;
+        sum = by_x ? product_of(dx, y, k, by_y) : sum;
+        return by_y ? ball_sum(sum, product_of(dy, x, k, by_x)) : sum;
     case QUOTIENT: // dx = q dy + y dq
         sum = by_x ? dx[k] : sum;
         if (by_y) {
             const struct ball *q = series_row(s, 0, i);
             sum = ball_difference(sum, product_of(dy, q, k, true));
         }
-        if (k > 0 && nodes[second].moves) {
+        if (by_y && k > 0) {
             const struct ball *dq = series_row(s, 1 + d, i);
             sum = ball_difference(sum, ball_convolution(y + 1, dq, k - 1));
         }
@@ -208,10 +202,10 @@ static void series_extend(struct series *s, struct ball step, int k,
             struct ball *row = series_row(s, 1 + d, i);
             if (node->operation == STATE && k == 0) {
                 row[0] = ball_exact(node->first == d ? 1.0 : 0.0);
-            } else if (node->operation == STATE && depends_on(model, i, d)) {
+            } else if (node->operation == STATE) {
                 const struct ball *rate = series_row(s, 1 + d, model->rate[node->first]);
                 row[k] = ball_product(share, rate[k - 1]);
-            } else if (depends_on(model, i, d)) {
+            } else if (node->moves && node->operation != TIME) {
                 row[k] = node_derivative(s, i, k, d);
             }
         }
