@@ -240,9 +240,11 @@ static inline bool instance_is_state(const struct instance *instance,
 /* True if the variable is a double that events write and that has a start value. */
 static inline bool instance_is_kept_number(const struct instance *instance,
                                            const struct variable *variable) {
+    const struct model_events *events = instance->model->events;
     return variable_is_discrete_state(variable) && variable->type == VARIABLE_FLOAT64 &&
-           (variable->initial == INITIAL_EXACT ||
-            (instance->model->events != NULL && instance->model->events->starts_follow));
+           events != NULL &&
+           variable->offset - events->discrete_states.offset < events->discrete_states.size &&
+           (variable->initial == INITIAL_EXACT || events->starts_follow);
 }
 
 /* Returns the index of an input of type float64 among the inputs. */
