@@ -192,7 +192,7 @@ ENDS = MODELS["derivatives_at_ends"]["of_domains"]
 def test_a_series_with_values_side_by_side_is_the_same(
     case: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As large models have it (fmu/equations/c_series.py)."""
+    """As large models have it (fmu/compiler/write/c_series.py)."""
     model, _, point, _ = case
     given = (
         model.values(**point),
@@ -201,11 +201,11 @@ def test_a_series_with_values_side_by_side_is_the_same(
         np.array([[point["u"], 0.3, -0.2, 0.1]]),
         12,
     )
-    monkeypatch.setattr("equations.c_series.FEWEST_IN_PAIRS", WIDE)
+    monkeypatch.setattr("compiler.write.c_series.FEWEST_IN_PAIRS", WIDE)
     text = model.file.text.partition("[outputs]")[0]
     one_by_one = Model(tmp_path, text)
     np.testing.assert_array_equal(one_by_one.series(*given), model.series(*given))
-    monkeypatch.setattr("equations.c_series.WIDE", 0)
+    monkeypatch.setattr("compiler.write.c_series.WIDE", 0)
     wide = Model(tmp_path, text)
     assert "const at)" in (tmp_path / "equations.c").read_text()
     np.testing.assert_allclose(wide.series(*given), model.series(*given), rtol=1e-12, atol=1e-14)
@@ -272,7 +272,7 @@ def test_a_series_of_a_power_begins_at_0(
     tmp_path: Path, wide: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of an exponent that is a parameter: a whole one, or half a one of a square."""
-    monkeypatch.setattr("equations.c_series.WIDE", wide)
+    monkeypatch.setattr("compiler.write.c_series.WIDE", wide)
     head = 'name = "M"\n[parameters]\nn = { start = 1 }\n[states]\n'
     text = 'x = { derivative = "2 + time" }\ny = { derivative = "(3 * x)**n" }\n'
     text += 'z = { derivative = "(x * x)**(0.5 + n / 2)" }\n'
