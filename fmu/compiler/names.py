@@ -1,5 +1,7 @@
 """Names in C of the variables of a file."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Iterable
 from itertools import groupby
@@ -11,26 +13,42 @@ def c_name(prefix: str, name: str) -> str:
     return "_".join([f"{prefix}{len(indexes) or ''}", base, *indexes])
 
 
+class Field(str):
+    """The text in C of a field of the value structure; an element of an array has an index."""
+
+    __slots__ = ("base", "index")
+
+    def __new__(cls, base: str, index: int | None = None) -> Field:
+        field = super().__new__(cls, base if index is None else f"{base}[{index}]")
+        field.base, field.index = base, index
+        return field
+
+
 class Fields:
     """Names in C of variables: elements of one array that follow each other share an array of C."""
 
     def __init__(self, sections: Iterable[Iterable[str]]) -> None:
-        self.suffixes: dict[str, str] = {}
+        self.suffixes: dict[str, tuple[str, int | None]] = {}
         for names in sections:
             for base, run in groupby(names, lambda name: name.partition("[")[0]):
                 elements = [*run]
                 for i, name in enumerate(elements):
-                    place = f"[{i}]" if "[" in name else ""
-                    self.suffixes[name] = c_name("", elements[0] if place else base) + place
+                    is_element = "[" in name
+                    own = c_name("", elements[0] if is_element else base)
+                    self.suffixes[name] = own, i if is_element else None
 
-    def value(self, name: str) -> str:
+    def _of(self, prefix: str, name: str) -> Field:
+        own, index = self.suffixes[name]
+        return Field(prefix + own, index)
+
+    def value(self, name: str) -> Field:
         """A number."""
-        return f"v{self.suffixes[name]}"
+        return self._of("v", name)
 
-    def count(self, name: str) -> str:
+    def count(self, name: str) -> Field:
         """A condition, whole number or enumeration."""
-        return f"m{self.suffixes[name]}"
+        return self._of("m", name)
 
-    def rate(self, name: str) -> str:
+    def rate(self, name: str) -> Field:
         """The derivative of a state."""
-        return f"d{self.suffixes[name]}"
+        return self._of("d", name)

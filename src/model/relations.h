@@ -184,3 +184,8 @@ static inline struct indicator relations_state_indicator(size_t state, int holds
                               .offset = sign * offset,
                               .rises = sign * factor * rate > 0.0};
 }
+
+/* Returns the indicator that the model writes: a distance from a limit. */
+static inline struct indicator relations_model_indicator(double limit) {
+    return (struct indicator){.kind = INDICATOR_OF_MODEL, .offset = fabs(limit)};
+}

@@ -90,7 +90,8 @@ def test_the_text_of_a_model_does_not_grow_with_its_arrays(tmp_path: Path) -> No
     def lines(text: str, *names: str) -> int:
         source = c_model.source(read_text(tmp_path, text))
         parts = [source.split(f" {name}(")[-1].split("\n}\n")[0] for name in names] or [source]
-        return sum(line[:5] != "    {" for part in parts for line in part.splitlines())
+        kept = [line for part in parts for line in part.splitlines() if line[:5] != "    {"]
+        return sum(line.endswith((";", "{", "}")) for line in kept)  # some have two lines
 
     assert lines(chain(210)) == lines(chain(260)) < 1500
     cells = [TEXTS["CELLS"].replace("300", n) for n in ("100", "150")]

@@ -25,8 +25,8 @@ from compiler.graph.graph import Graph  # noqa: E402
 from compiler.plain_c.interpreter import Interpreter  # noqa: E402
 from compiler.plain_c.text import CTextError, read  # noqa: E402
 from compiler.plain_c.values import Conditions  # noqa: E402
-from compiler.write.blocks import settled  # noqa: E402
 from compiler.write.derived import Derived, Wanted  # noqa: E402
+from compiler.write.guards import settled  # noqa: E402
 
 REAL = '#include "real.h"\n'
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror"]

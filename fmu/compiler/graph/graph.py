@@ -138,6 +138,8 @@ class Graph:
     has_switches: bool = True  # else relations are evaluated with the values
     has_times: bool = False  # without switches: relations of the time with constants are some
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
+    names: dict[Value, str] = field(default_factory=dict)  # in the source, of what it calculates
+    arrays: set[str] = field(default_factory=set)  # of tables, that C reads
 
     @property
     def located(self) -> list[Relation]:
@@ -461,11 +463,19 @@ class Graph:
         is_whole = z.op == "number" and z.number in range(WHOLE_UP_TO + 1)
         return self._power(x, self._less(z)) if is_whole else None
 
-    def derivatives(self, roots: Iterable[Value], seeds: Mapping[Value, Value]) -> list[Value]:
-        """Derivatives where each leaf has its own in `seeds`, or 0 if it is not there."""
+    def derivatives(
+        self,
+        roots: Iterable[Value],
+        seeds: Mapping[Value, Value],
+        found: dict[Value, Value] | None = None,
+    ) -> list[Value]:
+        """Derivatives where each leaf has its own in `seeds`, or 0 if it is not there.
+
+        found: gets those of all values that the roots follow from.
+        """
         roots, zero = list(roots), self.number(0.0)
         moving = {(leaf.op, leaf.name) for leaf in seeds}
-        found: dict[Value, Value] = {}
+        found = {} if found is None else found
         for y in in_order(roots):
             if not y.leaves & moving or y.op in STILL:
                 found[y] = zero
@@ -475,11 +485,19 @@ class Graph:
                 found[y] = self.chain(y, [found[argument] for argument in y.arguments])
         return [found[root] for root in roots]
 
-    def gradients(self, roots: Iterable[Value], by: Iterable[Value]) -> list[dict[Value, Value]]:
-        """For each root its derivatives by these leaves, where it follows from them."""
+    def gradients(
+        self,
+        roots: Iterable[Value],
+        by: Iterable[Value],
+        found: dict[Value, dict[Value, Value]] | None = None,
+    ) -> list[dict[Value, Value]]:
+        """For each root its derivatives by these leaves, where it follows from them.
+
+        found: gets those of all values that the roots follow from.
+        """
         roots, one, zero = list(roots), self.number(1.0), self.number(0.0)
         leaves = {(leaf.op, leaf.name): leaf for leaf in by}
-        found: dict[Value, dict[Value, Value]] = {}
+        found = {} if found is None else found
         for y in in_order(roots):
             if (y.op, y.name) in leaves:
                 found[y] = {y: one}

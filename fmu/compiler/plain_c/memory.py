@@ -138,7 +138,7 @@ class Memory:
         self.program, self.graph = program, graph
         self.types = Types(program, self.size)
         self.conditions = Conditions(graph, self.spend)
-        self.names: dict[Value, str] = {}  # of values, by the variables that got them
+        self.names = self.graph.names  # of values, by the variables that got them
         self.inputs: dict[int, tuple[str, LeafOf]] = {}
         self.objects: dict[int, Any] = {}  # types
         self.titles: dict[int, str] = {}  # names of variables

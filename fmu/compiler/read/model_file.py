@@ -83,6 +83,9 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
             with file_reader.located(path, file.text), placed(variable.place, variable.name):
                 what = f"is for what only events change, but {moving[0]} moves"
                 raise ModelFileError(f'variability: "{variable.variability}" {what}')
+    own = {state.value: f"der_{state.name}" for state in reversed(file.of("states"))}
+    own |= {variable.value: variable.name for variable in reversed(file.calculated)}
+    graph.names |= {value: name for value, name in own.items() if value.arguments}
     places = [source.place for source in sources]
     in_c = calls.relation_texts if calls else {}
     file.relation_texts = [

@@ -1,150 +1,111 @@
-"""Values of a graph as statements in C: a constant for each operation, in the order of the text."""
+"""Values of a graph as statements: a constant for each operation, in the order of the text."""
 
 from __future__ import annotations
 
-import math
-import re
-from collections import Counter
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 
-from ..expressions.expression import RELATIONS, in_order, written
-from ..graph.graph import CONDITIONS, LEAVES, MOST_COUNTED, Value
-from ..graph.tables import LookupTable
-from ..read.content import Expression
+from ..expressions.expression import in_order
+from ..graph.graph import CONDITIONS, LEAVES, Value
+from .loops import printed
+from .statements import Constant, Item, Operand, Place, store
 
-# operations as C writes them; a function is written as its call
-FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", "==", *RELATIONS)}
-FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
-FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}", "hypot": "slopes_hypot({}, {})"}
-FORMULAS |= {"noise": "random_normal({}, {}, {})", "uniform": "random_uniform({}, {}, {})"}
-
-LONGEST = 200  # characters of a text with indexes
-Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name
+WITHOUT_DERIVATIVES = ("value_of", "moving_as")  # elsewhere they are their first argument
+FUNCTIONS = {"hypot": "slopes_hypot", "noise": "random_normal", "uniform": "random_uniform"}
 
 
-def declared(c_type: str, fields: Iterable[str]) -> list[str]:
-    """Return the declarations of fields, in arrays where they are elements."""
-    sizes = Counter(field.partition("[")[:2] for field in fields)
-    return [
-        f"{c_type} {name}[{size}];" if bracket else f"{c_type} {name};"
-        for (name, bracket), size in sizes.items()
-    ]
+class Leaves(dict[tuple[str, str], Operand]):
+    """Where C has leaves, by operation and name; names of values, and arrays of tables in use."""
 
+    def __init__(
+        self,
+        places: Mapping[tuple[str, str], Operand],
+        names: Mapping[Value, str],
+        arrays: set[str],
+    ) -> None:
+        super().__init__(places)
+        self.names, self.arrays = names, arrays
 
-def number(value: float) -> str:
-    """Return a double that reads back as the same."""
-    if not math.isfinite(value):
-        infinity = "(double)INFINITY" if value > 0.0 else "(-(double)INFINITY)"
-        return "(double)NAN" if math.isnan(value) else infinity  # the macros are floats
-    return f"({value!r})" if math.copysign(1.0, value) < 0 else repr(value)
-
-
-def text(value: str) -> str:
-    """A string of C with any characters."""
-    return '"' + "".join(_character(byte) for byte in value.encode()) + '"'
-
-
-def shortened(name: str, expression: Expression, tables: Mapping[str, LookupTable]) -> str:
-    """A string of C of an assignment, in one line; indexes have their values.
-
-    Limits follow, beyond which it is not finite.
-    """
-    has_indexes = "[" in expression.text
-    value = f"{written(expression.tree):.{LONGEST}}" if has_indexes else expression.text
-    limits = {}
-    for node in in_order([expression.tree]):
-        if node.op == "floor":
-            of = " of its quotient" if node.function == "mod" else ""
-            limits[node.function] = f"up to 2^{MOST_COUNTED.bit_length() - 1}{of}"
-        elif node.op == "element":
-            ends = (",".join(map(str, of)) for of in (node.of[0], node.of[-1]))
-            limits[f"index of {node.name.partition('[')[0]}"] = "..".join(ends)
-        elif node.op == "table" and (ends := tables[node.name].ends):
-            limits[f"table {node.name}"] = "{:.6g}..{:.6g}".format(*ends)
-    shown = "; ".join(f"{what}: {limit}" for what, limit in limits.items())
-    return text(" ".join(f"{name}{value}{shown and f' [{shown}]'}".split()))
-
-
-def _character(byte: int) -> str:
-    plain = 32 <= byte < 127 and chr(byte) not in '"\\?%'
-    return chr(byte) if plain else f"\\{byte:03o}"
-
-
-def formula(op: str, *given: str) -> str:
-    """An operation on C expressions without operators: "-" in front of another would be "--"."""
-    return FORMULAS[op].format(*given) if op in FORMULAS else f"{op}({', '.join(given)})"
-
-
-def located(bounds: str, x: str) -> str:
-    """The segment of x in C; without bounds the largest whole number up to it."""
-    if not bounds:
-        return f"relations_floor({x})"
-    return f"relations_locate({bounds}, sizeof {bounds} / sizeof *{bounds}, {x})"
+    def but(self, own: Mapping[tuple[str, str], Operand]) -> Leaves:
+        """Return these leaves, of which some are elsewhere."""
+        return Leaves({**self, **own}, self.names, self.arrays)
 
 
 class Code:
-    """Statements, each value once; values that do not move are calculated in an `outer` code."""
+    """Statements, each value once; values that do not move are calculated in an `outer` code.
 
-    def __init__(self, leaves: Leaves, prefix: str = "n", outer: Code | None = None) -> None:
-        self.leaves, self.prefix, self.outer = leaves, prefix, outer
-        self.lines: list[str] = []
-        self.known: dict[Value, str] = {}
+    names: of more values than the source has names for.
+    """
 
-    def of(self, root: Value) -> str:
-        """Return the C expression of a value, without operators."""
+    def __init__(
+        self,
+        leaves: Leaves,
+        outer: Code | None = None,
+        names: Mapping[Value, str] | None = None,
+    ) -> None:
+        self.leaves, self.outer = leaves, outer
+        self.names = leaves.names if names is None else {**names, **leaves.names}
+        self.statements: list[Item] = []
+        self.known: dict[Value, Operand] = {}
+
+    def of(self, root: Value) -> Operand:
+        """Return the operand of a value."""
         if self.outer and not root.moves:
             return self.outer.of(root)
         for value in () if root in self.known else in_order([root], self.known):
-            self.known[value] = self._expression(value)
+            self.known[value] = self._operand(value)
         return self.known[root]
 
-    def _expression(self, value: Value) -> str:
+    def _operand(self, value: Value) -> Operand:
         if value.op == "number":
-            return number(value.number)
+            return value.number
         if value.op in LEAVES:
             return self.leaves[value.op, value.name]
         if self.outer and not value.moves:
             return self.outer.of(value)
-        c_type = "int" if value.op in (*CONDITIONS, "locate") else "double"
         given = [self.known[argument] for argument in value.arguments]
-        if value.op in ("value_of", "moving_as"):  # which differ in derivatives only
-            return given[0]
-        if value.op == "entry":
-            return self.constant(value.name + "".join(f"[{index}]" for index in given))
-        if value.op == "element":
-            row = f"(const double[]){{{', '.join(given[1:])}}}, {len(given) - 1}"
-            return self.constant(f"relations_element({row}, {given[0]})")
-        if value.op == "locate":
-            return self.constant(located(value.name, given[0]), c_type)
-        return self.constant(formula(value.op, *given), c_type)
+        name = self.names.get(value, "")
+        match value.op:
+            case op if op in WITHOUT_DERIVATIVES:
+                return given[0]
+            case "entry":
+                self.leaves.arrays.add(value.name)
+                return self.constant(("entry", value.name, *given), name=name)
+            case "element":
+                place, *row = given
+                return self.constant(
+                    ("relations_element", ("row", *row), len(row), place), name=name
+                )
+            case "locate":
+                return self.constant(located(self, value.name, given[0]), "int", name)
+        c_type = "int" if value.op in CONDITIONS else "double"
+        return self.constant(called(value.op, *given), c_type, name)
 
-    def constant(self, of: str, c_type: str = "double") -> str:
-        """Return the name of a new constant."""
-        name = f"{self.prefix}{len(self.lines)}"
-        self.lines.append(f"const {c_type} {name} = {of};")
-        return name
+    def constant(
+        self, of: Operand, c_type: str = "double", name: str = "", is_kept: bool = False
+    ) -> Constant:
+        """Return a new constant."""
+        self.statements.append(Constant(of, c_type, name, is_kept))
+        return self.statements[-1]
 
-    def assign(self, values: Mapping[str, Value]) -> Code:
-        """Give lvalues their values, after all of them have been calculated."""
-        found = [f"{target} = {self.of(value)};" for target, value in values.items()]
-        self.lines += found
+    def assign(self, values: Mapping[Place, Value]) -> Code:
+        """Give places their values, after all of them have been calculated."""
+        found = [(target, self.of(value)) for target, value in values.items()]
+        self.statements += [store(target, of) for target, of in found]
         return self
 
+    def lines(self) -> list[str]:
+        """Return the text of the statements."""
+        return printed(self.statements)[0]
 
-def indented(lines: list[str]) -> list[str]:
-    """Return lines of a block."""
-    return [f"    {line}" for line in lines]
+
+def called(op: str, *given: Operand) -> Operand:
+    """An operation of the graph."""
+    return FUNCTIONS.get(op, op), *given
 
 
-def filled(template: str, **parts: object) -> str:
-    """Text of a file of this folder; a line that is only $NAME becomes the lines of that part."""
-
-    def filled_in(found: re.Match[str]) -> str:
-        indent, lines, within = found.groups()
-        if within:
-            return str(parts[within])
-        return "".join(f"{indent}{line}\n" for line in parts[lines])
-
-    text = (Path(__file__).parent / template).read_text(encoding="utf-8")
-    return re.sub(r"^( *)\$(\w+)\n|\$(\w+)", filled_in, text, flags=re.MULTILINE)
+def located(code: Code, bounds: str, x: Operand) -> Operand:
+    """The segment of x; without bounds the largest whole number up to it."""
+    if not bounds:
+        return "relations_floor", x
+    code.leaves.arrays.add(bounds)
+    return "relations_locate", bounds, f"sizeof {bounds} / sizeof *{bounds}", x

@@ -12,25 +12,16 @@ from dataclasses import dataclass
 from functools import partial, reduce
 
 from ..expressions.expression import CONDITION, WHOLE, Kind, in_order
-from ..graph.graph import MOVING, Graph, Relation, Value, is_unknown
-from ..names import c_name
+from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
+from ..names import Field, c_name
 from ..read.content import COUNTS, SWITCHES, Change, ModelFile, Sampler
-from .c_code import (
-    Code,
-    Leaves,
-    declared,
-    filled,
-    indented,
-    located,
-    shortened,
-    text,
-)
+from .c_code import Code, Leaves, located
+from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
-from .rolled import rolled
+from .statements import Block, Operand, Place, Statement, field_of, store
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 
-INDICATOR = "z[{}]"  # in the order of located relations
 SECOND = {"s": 1}
 INDEXES = re.compile(r"\[([0-9,]+)\]")
 NEXT_TIME = [
@@ -43,29 +34,37 @@ NEXT_TIME = [
 
 def leaves(file: ModelFile) -> Leaves:
     """Where functions of value structures have the leaves, and their derivatives along a curve."""
-    found = {("time", ""): "t", ("first", ""): "dt"}
-    found["later", ""] = "relations_later(t, RELATIONS_TIME_ROUNDING * fabs(t))"
+    rounding = ("*", "RELATIONS_TIME_ROUNDING", ("fabs", "time"))
+    found: dict[tuple[str, str], Operand] = {("time", ""): "time", ("first", ""): "dt"}
+    found["later", ""] = "relations_later", "time", rounding
     for v in file.of("parameters", "inputs", "states", "discrete"):
-        for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
-            found[op, v.name] = f"{structure}->{file.fields.value(v.name)}"
+        field = file.fields.value(v.name)
+        found[v.leaf.op, v.name] = field_of("values", field, v.name)
+        found["first", v.name] = field_of("first", field, f"d_{v.name}")
+        found["second", v.name] = field_of("second", field, f"dd_{v.name}")
     for name, kind in file.kinds.items():
-        place = f"values->{file.fields.count(name)}"
+        field = file.fields.count(name)
         found |= (
-            {("mode", name): place}
+            {("mode", name): field_of("values", field, name, "int")}
             if kind == CONDITION
-            else {("integer", name): f"(double){place}"}
+            else {("integer", name): field_of("(double)values", field, name)}
         )
-    segments = enumerate(file.graph.segments)
-    found |= {("integer", name): f"values->segments[{i}]" for i, name in segments}
-    relations = enumerate(file.graph.relations)
-    return found | {("mode", name): f"values->relations[{i}]" for i, name in relations}
+    for i, name in enumerate(file.graph.segments):
+        found["integer", name] = Place("values->segments[", i, "]")
+    for i, name in enumerate(file.graph.relations):
+        found["mode", name] = Place("values->relations[", i, "]")
+    return Leaves(found, file.graph.names, file.graph.arrays)
 
 
 def arrays(file: ModelFile) -> Leaves:
-    """Return where functions of (values, t, x, u) have them."""
-    own = {("state", v.name): f"x[{i}]" for i, v in enumerate(file.of("states"))}
-    own |= {("input", v.name): f"u[{i}]" for i, v in enumerate(file.of("inputs"))}
-    return {**leaves(file), **own}
+    """Return where functions of states and inputs have them."""
+    return leaves(file).but(
+        {
+            (op, v.name): Place(f"{op}[", i, "]", v.name, is_opaque=True)
+            for op, section in (("state", "states"), ("input", "inputs"))
+            for i, v in enumerate(file.of(section))
+        }
+    )
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ class Tick:
     """A number about a sampler: a local variable of the FMU, which `linearize` differentiates."""
 
     name: str
-    field: str
+    field: Field
     value: Value
     exponents: dict[str, int]  # of its unit
     description: str  # rparm/linearization/sampling.py knows it by that
@@ -115,7 +114,7 @@ def ticks(file: ModelFile) -> list[Tick]:
                 name += "_"
             taken.add(name + end)
             description = f"Sampler {i}, {sampler.name}: {meaning}"
-            found.append(Tick(name + end, f"tick_{len(found)}", value, unit, description))
+            found.append(Tick(name + end, Field(f"tick_{len(found)}"), value, unit, description))
     return found
 
 
@@ -152,7 +151,9 @@ class Events:
     """All relations of a file with their indicators, and the functions of struct model_events."""
 
     def __init__(self, file: ModelFile) -> None:
-        self.file, self.graph = file, file.graph
+        self.file, self.graph, self.leaves = file, file.graph, leaves(file)
+        states = enumerate(file.of("states"))
+        self.tolerances = {("state", x.name): Place("tolerance[", i, "]") for i, x in states}
         graph, self.relations = file.graph, list(file.graph.relations.values())
         read = [(v.value, None) for v in file.of("states", "where", "outputs") if v.shown]
         for event in file.events:
@@ -170,19 +171,19 @@ class Events:
         return has_events(self.file)
 
     @property
-    def discrete(self) -> list[str]:
+    def discrete(self) -> list[Field]:
         """Fields of discrete states: times of samplers, and the discrete variables."""
-        ticks = [c_name("ticks", sampler.name) for sampler in self.file.sampled]
+        ticks = [Field(c_name("ticks", sampler.name)) for sampler in self.file.sampled]
         variables = [self.file.fields.value(v.name) for v in self.file.of("discrete")]
-        return [*(["start", *ticks] if ticks else []), *variables]
+        return [*([Field("start"), *ticks] if ticks else []), *variables]
 
-    def indicators(self) -> dict[str, Value]:
+    def indicators(self) -> dict[Field, Value]:
         """Indicators by their fields: signed distances, or 1."""
         one, found = self.graph.number(1.0), {}
         for i, relation in enumerate(self.located):
             z, used = self.signed(relation), self.used[relation.name]
             z = z if used is None else self.graph.value("if", used, z, one)
-            found[INDICATOR.format(i)] = z
+            found[Field("z", i)] = z
         return found
 
     def signed(self, relation: Relation) -> Value:
@@ -217,8 +218,10 @@ class Events:
         file, timed = self.file, [r for r in self.relations if r.time is not None]
         states = file.of("states")
         places = {relation.name: i for i, relation in enumerate(self.relations)}
-        indicators = {f"z[{i}]": z for i, z in enumerate(self.indicators().values())}
-        times = {f"times[{places[r.name]}]": r.time for r in timed}
+        indicators = {
+            Place("indicator[", i, "]"): z for i, z in enumerate(self.indicators().values())
+        }
+        times = {Place("times[", places[r.name], "]"): r.time for r in timed}
         table = [
             # at its time a timed one is past
             f"{{{int(r.rises if r.time else r.includes_zero)}, {int(r.time is not None)}, "
@@ -272,9 +275,9 @@ class Events:
             table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
             **self._rest(),
-            indicators=rolled(Code(arrays(file)).assign(indicators).lines)[0],
+            indicators=Code(arrays(file)).assign(indicators).lines(),
             compare=self._compare(),
-            times=Code(leaves(file)).assign(times).lines,
+            times=Code(self.leaves).assign(times).lines(),
             due=self._due(),
             changes=[
                 line
@@ -299,56 +302,62 @@ class Events:
                 break
         if not conditions:
             return {"rest": [], "is_at_rest": []}
-        code = Code(leaves(self.file))
+        code = Code(self.leaves)
         rests = code.of(reduce(partial(self.graph.value, "and"), conditions))
+        code.statements.append(Statement(("return ", ("!=", rests, 0), ";")))
         head = ["static bool is_at_rest(const void *values_pointer) {"]
         head += ["    const struct equations_values *values = values_pointer;"]
-        body = indented([*code.lines, f"return {rests} != 0;"])
-        return {"rest": [*head, *body, "}", ""], "is_at_rest": [".is_at_rest = is_at_rest,"]}
+        rest = [*head, *indented(code.lines()), "}", ""]
+        return {"rest": rest, "is_at_rest": [".is_at_rest = is_at_rest,"]}
 
     def _compare(self) -> list[str]:
         graph, states, inputs = self.graph, self.file.of("states"), self.file.of("inputs")
-        moving = {("first", v.name): f"given->du[{i}]" for i, v in enumerate(inputs)}
-        code, lines = Code({**leaves(self.file), **moving}), []
+        moving = {("first", v.name): Place("given->du[", i, "]") for i, v in enumerate(inputs)}
+        code = Code(self.leaves.but(moving))
         motion = {x.leaf: x.value for x in states} | {graph.value("time"): graph.number(1.0)}
         motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
-        given = {("state", x.name): f"given->state_errors[{i}]" for i, x in enumerate(states)}
+        given: dict[tuple[str, str], Operand] = {
+            ("state", x.name): Place("given->state_errors[", i, "]") for i, x in enumerate(states)
+        }
         given["time", ""] = "given->time"
         for i, u in enumerate(inputs):
             value, rate = code.leaves["input", u.name], moving["first", u.name]
-            size = f"fmax(fabs({value}), given->largest[{i}])"
-            error = f"given->inputs * {size} + {given['time', '']} * fabs({rate})"
-            given["input", u.name] = f"({error})"
+            size = "fmax", ("fabs", value), Place("given->largest[", i, "]")
+            of_value, of_time = ("*", "given->inputs", size), ("*", "given->time", ("fabs", rate))
+            given["input", u.name] = "+", of_value, of_time
         errors = Errors(graph, code, given)
+        stores = []
         for k, relation in enumerate(self.relations):
             distance, used = relation.distance, self.used[relation.name]
             error = errors.of(distance) if relation.time is None else NONE
             (slope,) = graph.derivatives([distance], motion)
-            lines += [
-                f"compared[{k}].distance = {code.of(distance)};",
-                f"compared[{k}].slope = {code.of(slope)};",
-                f"compared[{k}].noise = {error};",
-                f"compared[{k}].used = {'1' if used is None else code.of(used) + ' != 0'};",
-            ]
-        return rolled(code.lines + lines)[0]
+            found = {"distance": code.of(distance), "slope": code.of(slope), "noise": error}
+            found["used"] = "1" if used is None else code.of(used)
+            stores += [store(Place("compared[", k, f"].{key}"), of) for key, of in found.items()]
+        code.statements += stores
+        return code.lines()
 
     def _due(self) -> list[str]:
         """Return whether each event of the file is due."""
-        code = Code(leaves(self.file))
+        code, stores = Code(self.leaves), []
         for i, event in enumerate(self.file.events):
-            during = "" if event.during is None else f" && {code.of(event.during.value)}"
-            code.lines.append(f"due[{i}] = {code.of(event.when.value)}{during};")
-        return rolled(code.lines)[0]
+            found = code.of(event.when.value)
+            if event.during is not None:
+                found = "and", found, code.of(event.during.value)
+            stores.append(store(Place("due[", i, "]"), found))
+        code.statements += stores
+        return code.lines()
 
     def _segments(self, places: Mapping[str, int]) -> dict[str, object]:
-        segments, code = self.graph.segments.values(), Code(leaves(self.file))
+        segments, code = self.graph.segments.values(), Code(self.leaves)
         table = []
         for i, s in enumerate(segments):
-            code.lines.append(f"segment[{i}] = {located(s.bounds, code.of(s.argument))};")
+            at = located(code, s.bounds, code.of(s.argument))
+            code.statements.append(store(Place("number[", i, "]"), at))
             bounds = (s.first, s.first + s.count - 1, int(self.graph.is_of_inputs(s.low.distance)))
             row = (places[s.low.name], places[s.high.name], *bounds)
             table.append(f"{{{', '.join(map(str, row))}}},")
-        return {"segments": len(segments), "segment": table or ["{0},"], "locate": code.lines}
+        return {"segments": len(segments), "segment": table or ["{0},"], "locate": code.lines()}
 
     def _rows_of_assignments(self) -> list[str]:
         """Rows of struct assignment."""
@@ -371,50 +380,57 @@ class Events:
 
     def _starts(self) -> list[str]:
         new = {v.name: v.initial.value for v in self.file.started}
-        counted, code = _counted(self.file).items(), Code(leaves(self.file))
-        assigned = self._assigned(code, new)
+        counted, code = _counted(self.file).items(), Code(self.leaves)
+        code.statements += [
+            *(store(field_of("values", self.file.fields.count(n)), k) for n, (_, k) in counted),
+            *self._assigned(code, new, is_single=len(new) == 1),
+        ]
         return [
             "static void start(void *values_pointer) {",
             "    struct equations_values *values = values_pointer;",
-            *(
-                f"    values->{self.file.fields.count(name)} = {start};"
-                for name, (_, start) in counted
-            ),
-            *indented(rolled(code.lines + assigned)[0]),
+            *indented(code.lines()),
             "}",
             "",
         ]
 
     def _periods(self) -> list[str]:
-        code = Code(leaves(self.file))
+        code = Code(self.leaves)
         for i, sampler in enumerate(self.file.sampled):
-            code.assign({f"every[{i}]": sampler.every.value, f"offset[{i}]": sampler.offset.value})
-        return code.lines
+            every, offset = Place("every[", i, "]"), Place("offset[", i, "]")
+            code.assign({every: sampler.every.value, offset: sampler.offset.value})
+        return code.lines()
 
     def _change(self, index: int, change: Change) -> list[str]:
         """What an event or a sampler of the file does."""
-        states = [state.name for state in self.file.of("states")]
-        code = Code({**leaves(self.file), ("later", ""): "later"})
-        lines = self._assigned(code, {name: e.value for name, e in change.given.items()})
-        errors = Errors(
-            self.graph, code, {("state", name): f"tolerance[{i}]" for i, name in enumerate(states)}
-        )
+        code = Code(self.leaves.but({("later", ""): "later"}))
+        is_single = len(change.given) + len(change.reinit) == 1
+        new = {name: e.value for name, e in change.given.items()}
+        stores = self._assigned(code, new, is_single)
+        errors = Errors(self.graph, code, self.tolerances)
         jumped = {name: errors.of(e.value) for name, e in change.reinit.items()}
-        lines += [f"tolerance[{states.index(name)}] = {e};" for name, e in jumped.items()]
+        for name, error in jumped.items():
+            of = error if error == NONE else code.constant(error, is_kept=True)
+            stores.append(store(self.tolerances["state", name], of))
         if isinstance(change, Sampler) and change.during is not None:
-            lines = [f"if ({code.of(change.during.value)}) {{", *indented(lines), "}"]
-        return [f"if (event == {index}) {{", *indented(code.lines + lines), "}"]
+            stores = [Block(code.of(change.during.value), (stores,))]
+        code.statements += stores
+        return [f"if (event == {index}) {{", *indented(code.lines()), "}"]
 
-    def _assigned(self, code: Code, new: Mapping[str, Value]) -> list[str]:
-        """Statements that give variables and modes the new values, which the code calculates."""
-        counted, fields = _counted(self.file), {}
+    def _assigned(self, code: Code, new: Mapping[str, Value], is_single: bool) -> list[Statement]:
+        """Statements that give variables and modes the new values, which the code calculates.
+
+        is_single: no other statement changes what these values follow from.
+        """
+        counted, stores = _counted(self.file), []
         for name, value in new.items():
             if name in counted:
-                whole = count(code, counted[name][0], value)
-                fields[self.file.fields.count(name)] = code.constant(whole, "int")
+                of, c_type = count(code, counted[name][0], value), "int"
+                field = self.file.fields.count(name)
             else:
-                fields[self.file.fields.value(name)] = code.constant(code.of(value))
-        return [f"values->{field} = {value};" for field, value in fields.items()]
+                of, c_type, field = code.of(value), "double", self.file.fields.value(name)
+            found = code.constant(of, c_type, f"new_{name}", not is_single)
+            stores.append(store(field_of("values", field, name), found))
+        return stores
 
     def _counts(self) -> list[str]:
         """Rows of struct count: name, smallest and largest value."""
@@ -428,15 +444,16 @@ class Events:
         return rows
 
     def _describe(self) -> list[str]:
-        code = Code(leaves(self.file))
+        code, stores = Code(self.leaves), []
         for i, relation in enumerate(self.located):
             found, used = self._described(code, relation), self.used[relation.name]
             if used is not None:
-                found = f"{code.of(used)} ? {found} : unused"
-            code.lines.append(f"indicator[{i}] = {found};")
-        return rolled(code.lines)[0]
+                found = "if", code.of(used), found, "unused"
+            stores.append(store(Place("indicator[", i, "]"), found))
+        code.statements += stores
+        return code.lines()
 
-    def _described(self, code: Code, relation: Relation) -> str:
+    def _described(self, code: Code, relation: Relation) -> Operand:
         """How an indicator follows from the states: from one by a factor, if it can be."""
         distance, zero = relation.distance, self.graph.number(0.0)
         moving = [leaf for leaf in distance.leaves if leaf[0] in MOVING]
@@ -447,13 +464,12 @@ class Events:
             factor = self.graph.derivative(distance, x.leaf)
             if not factor.moves:
                 rate = zero if ("time", "") in x.value.leaves else x.value  # unknown here
-                at_zero = Code({**code.leaves, moving[0]: "0.0"})
-                at_zero.lines = code.lines  # which number its constants, too
+                at_zero = Code(code.leaves.but({moving[0]: 0.0}))
+                at_zero.statements = code.statements  # which have its constants, too
                 offset = at_zero.of(distance)
                 holds, factor, rate = (code.of(v) for v in (relation.mode, factor, rate))
-                return f"relations_state_indicator({place}, {holds}, {factor}, {offset}, {rate})"
-        limit = code.of(relation.limit or zero)
-        return f"(struct indicator){{.kind = INDICATOR_OF_MODEL, .offset = fabs({limit})}}"
+                return "relations_state_indicator", place, holds, factor, offset, rate
+        return "relations_model_indicator", code.of(relation.limit or zero)
 
 
 def _every_name(sampler: Sampler) -> str:
@@ -463,10 +479,12 @@ def _every_name(sampler: Sampler) -> str:
     return f"sampler {sampler.name}: every{of}"
 
 
-def count(code: Code, kind: Kind, value: Value) -> str:
+def count(code: Code, kind: Kind, value: Value) -> Operand:
     """The int of a condition, whole number or item of an enumeration."""
     found = code.of(value)
-    return f"{found} != 0" if kind == CONDITION else f"relations_whole({found})"
+    if kind != CONDITION:
+        return "relations_whole", found
+    return found if value.op in CONDITIONS and value.op != "mode" else ("!=", found, "0")
 
 
 def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:

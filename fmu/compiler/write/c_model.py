@@ -7,15 +7,17 @@ from typing import Any
 from ..expressions.expression import RELATIONS, in_order
 from ..graph.band import band
 from ..graph.graph import FALLIBLE, Value, is_number
+from ..names import Field
 from ..read.content import OPTIONS, ModelFile
-from .c_code import Code, declared, filled, indented, number, shortened, text
+from .c_code import Code
 from .c_events import Events, arrays, count, leaves, ticks
 from .c_series import Series
-from .rolled import rolled
+from .c_text import declared, filled, indented, number, shortened, text
+from .loops import printed
+from .statements import Block, Operand, Place, Statement, field_of, store
 
 STRUCTURE = "struct equations_values"
 SYMBOL = "equations_model"
-HERE = "/* tables */"  # the line where they stand
 BY_AVX2 = """
 BY_AVX2 static enum status extend_by_avx2(const struct series_origin *origin, int first, int last,
                                           double row[][SERIES_LENGTH]) {
@@ -29,8 +31,8 @@ static enum status extend(const struct series_origin *origin, int first, int las
 }
 """
 MOST_SHOWN = 8  # values of parameters in a message
-LONG = 1000  # statements for derivatives in small code: compilers need less time
-FOLLOWED = "relations_followed(&relations, ROOM, values, t, &copy)"
+LONG = 500  # lines for derivatives in small code: compilers need less time
+FOLLOWED = "relations_followed(&relations, ROOM, values, time, &copy)"
 
 
 def header(file: ModelFile) -> str:
@@ -59,17 +61,20 @@ def source(file: ModelFile) -> str:
     series = Series(file.graph, *(({}, []) if has_kinks else followed), leaves(file))
     has_domains = bool(events.located) and _may_end(file)
     smooth = _smooth(file)
-    text = filled(
-        "equations.c.in",
+    parts = {
         **smooth,
-        tables=[HERE],
         **_series(series, has_domains),
-        series_of_model=[] if has_kinks else [".series = &series,"],
+        "series_of_model": [] if has_kinks else [".series = &series,"],
         **_calculated(file, events),
         **_domains(file, events, series, has_domains, smooth["jacobian_size"]),
-        events=events.functions("_in_domain" * has_domains),
+        "events": events.functions("_in_domain" * has_domains),
+        "checks": _checks(file),
+    }
+    return filled(
+        "equations.c.in",
+        **parts,
+        tables=_tables(file),  # those that the parts read
         followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
-        checks=_checks(file),
         expressions=_expressions(file),
         ranges=[
             *_parameter_lines(file),
@@ -77,7 +82,6 @@ def source(file: ModelFile) -> str:
         ],
         model_events=[".events = &events,"] if events else [],
     )
-    return text.replace(f"{HERE}\n", "".join(f"{line}\n" for line in _tables(file, text)))
 
 
 def _expressions(file: ModelFile) -> list[str]:
@@ -91,22 +95,23 @@ def _expressions(file: ModelFile) -> list[str]:
     ] or ["{0},"]
 
 
-def _tables(file: ModelFile, text: str) -> list[str]:
-    """Constant arrays of tables that a text uses."""
-    lines, used = [], set(re.findall(r"\btable_\w+", text))
+def _tables(file: ModelFile) -> list[str]:
+    """Constant arrays of tables that functions read."""
+    lines, used = [], file.graph.arrays
     for table in file.tables.values():
         for name, dimensions, values in table.arrays():
             if name not in used:
                 continue
             numbers = [number(value) for value in values]
-            width = len(table.axes[-1].origins) if dimensions.count("[") == 2 else len(numbers)
+            is_grid = dimensions.count("[") == 2
+            width = len(table.axes[-1].origins) if is_grid else len(numbers)
             rows = [", ".join(numbers[i : i + width]) for i in range(0, len(numbers), width)]
-            content = ", ".join(f"{{{row}}}" for row in rows) if len(rows) > 1 else rows[0]
+            content = ", ".join(f"{{{row}}}" for row in rows) if is_grid else rows[0]
             lines.append(f"static const double {name}{dimensions} = {{{content}}};")
     return lines
 
 
-def _ranges(file: ModelFile) -> dict[str, list[str]]:
+def _ranges(file: ModelFile) -> dict[str, list[Field]]:
     """Fields that are set from outside and their derivatives, by the ranges of struct model."""
     ranges = {
         section: [file.fields.value(v.name) for v in file.of(section)]
@@ -115,10 +120,10 @@ def _ranges(file: ModelFile) -> dict[str, list[str]]:
     return ranges | {"dx": [file.fields.rate(state.name) for state in file.of("states")]}
 
 
-def _options(file: ModelFile) -> list[str]:
+def _options(file: ModelFile) -> list[Field]:
     """Fields of Boolean parameters, ints behind the others, in pairs: there are no gaps."""
     names = [file.fields.count(v.name) for v in file.of(OPTIONS)]
-    return [*names, "unused"] if len(names) % 2 else names
+    return [*names, Field("unused")] if len(names) % 2 else names
 
 
 def _parameter_lines(file: ModelFile) -> list[str]:
@@ -130,7 +135,7 @@ def _parameter_lines(file: ModelFile) -> list[str]:
     return [f".parameters = {{offsetof({STRUCTURE}, {first}), {size}}},"]
 
 
-def _range_lines(ranges: Mapping[str, list[str]]) -> list[str]:
+def _range_lines(ranges: Mapping[str, list[Field]]) -> list[str]:
     """Initializers of struct range, of fields that follow each other."""
     return [
         f".{name} = {{offsetof({STRUCTURE}, {fields[0]}), {len(fields)} * sizeof(double)}},"
@@ -143,7 +148,13 @@ def _smooth(file: ModelFile) -> dict[str, Any]:
     """What the methods of integration evaluate, a smooth function between events."""
     states = file.of("states")
     rates, count = [state.value for state in states], len(states)
-    rows = file.graph.gradients(rates, [state.leaf for state in states])
+    found: dict[Value, dict[Value, Value]] = {}
+    rows = file.graph.gradients(rates, [state.leaf for state in states], found)
+    names = {
+        slope: f"{name.partition('[')[0]}_by_{x.name}"
+        for value, name in file.graph.names.items()
+        for x, slope in found.get(value, {}).items()
+    }
     slopes = {
         (i, j): rows[i][state.leaf]
         for j, state in enumerate(states)
@@ -153,15 +164,14 @@ def _smooth(file: ModelFile) -> dict[str, Any]:
     narrow = band(count, slopes)
     size = narrow.size if narrow else count * count
     entries = {
-        f"J[places[{k}]]" if narrow else f"J[{j * count + i}]": slope
+        Place("slope[places[", k, "]]") if narrow else Place("slope[", j * count + i, "]"): slope
         for k, ((i, j), slope) in enumerate(slopes.items())
     }
-    clear = [f"for (size_t i = 0; i < {size}; i++) {{", "    J[i] = 0.0;", "}"]
-    motion = {f"dx[{i}]": rate for i, rate in enumerate(rates)}
-    (right_hand_side,) = rolled(Code(arrays(file)).assign(motion).lines)
-    (jacobian,) = rolled(Code(arrays(file)).assign(entries).lines)
+    clear = [f"for (size_t i = 0; i < {size}; i++) {{", "    slope[i] = 0.0;", "}"]
+    motion = {Place("rate[", i, "]"): rate for i, rate in enumerate(rates)}
+    jacobian = Code(arrays(file), names=names).assign(entries).lines()
     return {
-        "right_hand_side": right_hand_side,
+        "right_hand_side": Code(arrays(file)).assign(motion).lines(),
         "jacobian": clear * (len(entries) < size) + jacobian,
         "jacobian_size": size,
         "band": narrow.lines if narrow else [],
@@ -219,10 +229,10 @@ def _domains(
     calculated = ranges["dx"] + [file.fields.value(v.name) for v in file.calculated_reals]
     groups = {key: ranges[key] for key in ("states", "inputs")}
     groups |= {"calculated": calculated, "indicators": list(events.indicators())}
-    distances = {f"distance[{i}]": r.distance for i, r in enumerate(events.relations)}
+    distances = {Place("distance[", i, "]"): r.distance for i, r in enumerate(events.relations)}
     text = filled(
         "domains.c.in",
-        distances=Code(leaves(file)).assign(distances).lines,
+        distances=Code(leaves(file)).assign(distances).lines(),
         ranges=_range_lines(groups),
         own_row=series.row_count,
         jacobian_size=jacobian_size,
@@ -254,82 +264,93 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
     for variable in file.of("parameters", "inputs", "states", "discrete"):
         first = seeds[variable.leaf] = graph.value("first", name=variable.name)
         seeds[first] = graph.value("second", name=variable.name)
-    firsts = graph.derivatives(fields.values(), seeds)
-    seconds = graph.derivatives(firsts, seeds)
-    curve = Code(leaves(file))
-    curve.assign({f"d->{name}": value for name, value in zip(fields, firsts, strict=True)})
-    split = len(curve.lines)
-    curve.assign({f"dd->{name}": value for name, value in zip(fields, seconds, strict=True)})
+    first_of: dict[Value, Value] = {}
+    second_of: dict[Value, Value] = {}
+    firsts = graph.derivatives(fields.values(), seeds, first_of)
+    seconds = graph.derivatives(firsts, seeds, second_of)
+    found = [(first_of[value], name) for value, name in graph.names.items() if value in first_of]
+    names = {second_of[first]: f"dd_{name}" for first, name in found if first in second_of}
+    names |= {first: f"d_{name}" for first, name in found}
+    curve, sections = Code(leaves(file), names=names), []
+    for structure, order in (("first", firsts), ("second", seconds)):
+        targets = [field_of(structure, field, field) for field in fields]
+        curve.assign(dict(zip(targets, order, strict=True)))
+        sections.append(curve.statements)
+        curve.statements = []
     real = [v for v in file.started if v.is_real]
-    started = {f"->{file.fields.value(v.name)} += ": v.initial.value for v in real}
+    started = {file.fields.value(v.name): v.initial.value for v in real}
     start_firsts = graph.derivatives(started.values(), seeds)
     start_seconds = graph.derivatives(start_firsts, seeds)
-    outputs = Code(leaves(file)).assign({f"to->{n}": v for n, v in fields.items()})
+    outputs = Code(leaves(file))
+    outputs.assign({field_of("to", field, field): value for field, value in fields.items()})
     for v in file.calculated_counts:
         field = file.fields.count(v.name)
-        outputs.lines.append(f"to->{field} = {count(outputs, v.kind, v.value)};")
-    first, second = rolled(curve.lines[:split], curve.lines[split:])
+        of = count(outputs, v.kind, v.value)
+        outputs.statements.append(store(field_of("to", field, field), of))
+    first, second = printed(*sections)
     is_long = len(first) + len(second) >= LONG
     return {
         "storage_of_derivatives": "SELDOM_CALLED static" if is_long else "static",
-        "started": _at_start(file, "d", dict(zip(started, start_firsts, strict=True))),
-        "started_twice": _at_start(file, "dd", dict(zip(started, start_seconds, strict=True))),
-        "outputs": rolled(outputs.lines)[0],
+        "started": _at_start(file, "first", dict(zip(started, start_firsts, strict=True))),
+        "started_twice": _at_start(file, "second", dict(zip(started, start_seconds, strict=True))),
+        "outputs": outputs.lines(),
         "derivatives": first,
         "second_derivatives": second,
     }
 
 
-def _at_start(file: ModelFile, structure: str, derivatives: Mapping[str, Value]) -> list[str]:
+def _at_start(file: ModelFile, structure: str, derivatives: Mapping[Field, Value]) -> list[str]:
     """Add derivatives of start values to the states' derivatives, until the initialization ends."""
-    derivatives = {to: d for to, d in derivatives.items() if not is_number(d, 0.0)}
-    if not derivatives:
+    code, condition = Code(leaves(file)), "!values->is_begun"
+    stores = [
+        store(field_of(structure, field, field), code.of(value), "+=")
+        for field, value in derivatives.items()
+        if not is_number(value, 0.0)
+    ]
+    if not stores:
         return []
-    code = Code(leaves(file))
-    code.lines += [f"{structure}{to}{code.of(value)};" for to, value in derivatives.items()]
-    condition = "!values->is_begun" + (" && dd != NULL" if structure == "dd" else "")
-    return [f"if ({condition}) {{", *indented(code.lines), "}"]
+    code.statements += stores
+    if structure == "second":
+        condition = f"{condition} && second != NULL"
+    return [f"if ({condition}) {{", *indented(code.lines()), "}"]
 
 
-def _message(file: ModelFile, code: Code, given: str, condition: Value) -> str:
+def _message(file: ModelFile, code: Code, given: str, condition: Value) -> tuple[Operand, ...]:
     """Format and arguments of a message, in which values stand in the place of {NAME}.
 
     In a message without names there follow the parameters that the condition reads.
     """
     parts = re.split(r"\{(\w+(?:\[[0-9,]+\])?)\}", given)
-    form, arguments = parts[0].replace("%", "%%"), ""
+    form, arguments = parts[0].replace("%", "%%"), []
     for name, rest in zip(parts[1::2], parts[2::2], strict=True):
         variable, shown = file.variables.get(name), f"{{{name}}}"
         value = variable and (variable.leaf or variable.value)
         if value and {op for op, _ in value.leaves} <= {"parameter", "integer"}:
-            shown = "%g" if variable.is_real else "%d"
-            found = code.of(value)
-            arguments += f", {found} + 0.0" if variable.is_real else f", (int){found}"
+            shown, found = ("%g" if variable.is_real else "%d"), code.of(value)
+            arguments += [", ", ("+", found, 0.0) if variable.is_real else ("(int)", found)]
         form += shown + rest.replace("%", "%%")
     if not arguments:
         read = [v for v in file.of("parameters") if (v.leaf.op, v.name) in condition.leaves]
         shown = ", ".join(f"{v.name} = %g" for v in read[:MOST_SHOWN])
         form += shown and f" ({shown})"
-        arguments = "".join(f", {code.of(v.leaf)}" for v in read[:MOST_SHOWN])
-    return text(form) + arguments
+        arguments = [part for v in read[:MOST_SHOWN] for part in (", ", code.of(v.leaf))]
+    return text(form), *arguments
 
 
 def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
     conditions = [
-        (f"isfinite(values->{file.fields.value(v.name)})", text(f"{base} is not finite"))
+        (("isfinite", code.of(v.leaf)), (text(f"{v.name.partition('[')[0]} is not finite"),))
         for v in file.of("parameters")
-        for base in v.name.split("[")[:1]
     ]
     for message, check in file.checks:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
         conditions.append((code.of(holds), _message(file, code, message, check.value)))
-    lines = []
+    refused = Statement(("return STATUS_INVALID_PARAMETERS;",))
     for condition, message in conditions:
-        why = f"    (void)snprintf(text, size, {message});"
-        refused = [f"if (!{condition}) {{", why, "    return STATUS_INVALID_PARAMETERS;", "}"]
-        lines.append("\n".join(refused))
-    return rolled(code.lines + lines)[0]
+        why = Statement(("(void)snprintf(text, size, ", *message, ");"))
+        code.statements.append(Block(("not", condition), ([why, refused],)))
+    return code.lines()

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import partial, reduce
 from itertools import combinations, groupby
+from typing import NamedTuple
 
 from ..expressions.expression import in_order
 from ..graph.graph import (
@@ -23,14 +24,27 @@ from ..graph.graph import (
     unsigned,
     with_partials,
 )
-from .c_code import Code, Leaves, formula, indented
-from .rolled import SHORTEST, rolled
+from .c_code import WITHOUT_DERIVATIVES, Code, Leaves, called
+from .c_text import indented
+from .loops import OF_MODELS, SHORTEST, printed
+from .statements import Block, Item, Operand, Place, Statement, store
 
-FACTORS = re.compile(r"row\[(\d+)\]\[i( - 1|)\] \* row\[(\d+)\]\[k - i\]")
 FEWEST_IN_PAIRS = 4  # sums of a series that gains by adding up two at once
 WIDE = 150  # values that move in a model whose series has elements side by side
 VANISHING = 5  # factors of a product whose zero may have as many orders as the shortest series
 FLAT = 4  # degree of divisors whose small values show in the states' own terms, not between points
+
+
+OF_SERIES = OF_MODELS | {"row", "origin", "last", "i", "k", "h", "at", "s", "over_k"}
+
+
+class Term(NamedTuple):
+    """x_i y_(k-i) of a sum over i, times i if it is weighted; of a rate x_(i-1)."""
+
+    x: Value
+    y: Value
+    is_weighted: bool
+    is_rate: bool
 
 
 class Series:
@@ -45,7 +59,7 @@ class Series:
         roots = scaled(graph, roots, self.is_wide)
         self.rates = dict(zip(rates, roots, strict=False))
         values = [value for value in with_partials(graph, roots) if value.moves]
-        self.sums: dict[str, str] = {}  # by term i
+        self.sums: dict[Term, Place] = {}
         factors = {factor for value in values for factor in self._read(value)}
         needed = [v for v in values if (v in factors or v in roots) and v not in rates]
         self.order = {value: i for i, value in enumerate([*rates, *needed])}  # in products
@@ -61,30 +75,35 @@ class Series:
         self.row_count = len(self.rows) + len(self.columns)
         self.row_of_followed = [self.rows.get(value, 0) for value in roots[len(rates) :]]
         self.still = Code(leaves)  # what does not move
-        self.first = Code(self._own_leaves("0"), "v", self.still)
+        self.first = Code(self._own_leaves("0"), self.still)
         targets = {place: value for value in needed for place in self._places(value, "0")}
         targets |= {self._row(value, "0"): value for value in self.columns if value in rates}
         self.first.assign(targets)
-        self.start = Code(self._own_leaves("0"), "z", self.still)
+        self.start = Code(self._own_leaves("0"), self.still)
         self.start.known |= {value: self._row(value, "0") for value in needed}
-        self.later = Code(self._own_leaves("k"), "c", self.still)
-        self.integrals = ["const double h = origin->time_scale / k;"] if rates else []
-        self._coefficients = {value: "" for value in values if value.op in CONDITIONS}
-        self._late: list[str] = []  # statements for the values of one form
+        self.later = Code(self._own_leaves("k"), self.still)
+        self.has_over_k = False  # whether coefficients need 1 / k
+        self._coefficients: dict[Value, Operand] = {v: 0.0 for v in values if v.op in CONDITIONS}
+        self._late: list[Item] = []  # statements for the values of one form
         asked = [*rates, *needed]
         if self.is_wide:  # all that they follow from, too
             asked = sorted((v for v in in_order(asked) if v.moves), key=self.forms.__getitem__)
         for _, same in groupby(asked, lambda value: self.is_wide and self.forms[value]):
             for value in same:
                 self._at(value)
-            self.later.lines += self._late
+            self.later.statements += self._late
             self._late.clear()
+        self.integrals: list[Item] = []
+        if self.has_over_k:
+            self.integrals.append(Statement(("const double over_k = 1.0 / k;",)))
+        if rates:
+            self.integrals.append(Statement(("const double h = origin->time_scale / k;",)))
         for i, rate in enumerate(roots[: len(rates)]):
             if rate.moves:
-                last = f"h * {self._row(rate, 'k - 1')}"
+                last = "*", "h", self._row(rate, "k - 1")
             else:
-                last = f"k == 1 ? h * {self.still.of(rate)} : 0.0"
-            self.integrals.append(f"row[{i}][k] = {last};")
+                last = "if", ("==", "k", "1"), ("*", "h", self.still.of(rate)), 0.0
+            self.integrals.append(store(Place("row[", i, "][k]"), last))
 
     def inner(self) -> list[str]:
         """What may be nothing at the begin of a step and large within, and its argument."""
@@ -122,101 +141,121 @@ class Series:
             self._sort_sums()
             width = len(self.columns)
             own = f"double(*const at)[{width}] = (double(*)[{width}])(void *)row[{len(self.rows)}];"
-            self.still.lines.insert(0, own)
-        if any("over_k" in line for line in self.later.lines):
-            self.integrals.insert(0, "const double over_k = 1.0 / k;")
-        terms = [f"{name} += {term};" for term, name in self.sums.items()]
+            self.still.statements.insert(0, Statement((own,)))
         parts = {
-            "still": self.still.lines,
-            "first": self.first.lines,
-            "start": self.start.lines,
-            "sums": [f"double {name} = 0.0;" for name in self.sums.values()],
-            "terms": terms,
+            "still": self.still.statements,
+            "first": self.first.statements,
+            "start": self.start.statements,
+            "sums": [Statement(("double ", to, " = 0.0;")) for to in self.sums.values()],
+            "terms": [store(to, self._of_term(term), "+=") for term, to in self.sums.items()],
             "integrals": self.integrals,
-            "later": self.later.lines,
+            "later": self.later.statements,
         }
-        is_short = not self.is_wide and sum(map(len, parts.values())) < SHORTEST
-        if is_short and len(terms) >= FEWEST_IN_PAIRS:
+        is_long = sum(map(len, parts.values())) >= SHORTEST
+        parts["both"] = [  # two terms at once: half the additions wait for each other
+            store(to, ("+", self._of_term(term), self._of_term(term, 1)), "+=")
+            for term, to in self.sums.items()
+        ]
+        if is_long or self.is_wide:
+            for to in self.sums.values():
+                to.before, to.after = "s[", "]"
+            own = [Statement((f"double s[{len(self.sums)}];",))] * bool(self.sums)
+            parts["sums"] = [*own, *(store(to, 0.0) for to in self.sums.values())]
+        elif len(self.sums) >= FEWEST_IN_PAIRS:
             self._pair(parts)
-        elif not is_short:
-            for part in ("sums", "terms", "later"):
-                parts[part] = [re.sub(r"\bs(\d+)\b", r"s[\1]", line) for line in parts[part]]
-            own = [line.removeprefix("double ") for line in parts["sums"]]
-            parts["sums"] = [f"double s[{len(self.sums) or 1}];", *own]
-        found = dict(zip(parts, rolled(*parts.values()), strict=True))
-        if terms:
-            found["terms"] = ["for (int i = 1; i < k; i++) {", *indented(found["terms"]), "}"]
-        if terms and not self.is_wide:  # two at once: half the additions wait for each other
-            both = [re.sub(r"\+= (.*);$", _with_next, line) for line in found["terms"][1:-1]]
-            last = ["if (k % 2 == 0) {", "    const int i = k - 1;", *found["terms"][1:]]
-            found["terms"] = ["for (int i = 1; i + 1 < k; i += 2) {", *both, "}", *last]
+        taken = OF_SERIES.union(*({f"s{i}", f"p{i}"} for i in range(len(self.sums))))
+        # a place's name would be a load in each turn, where an operation can read memory
+        lines = printed(*parts.values(), taken=taken, is_long=is_long, has_named_places=False)
+        found = dict(zip(parts, lines, strict=True))
+        both, terms = found.pop("both"), found["terms"]
+        if self.is_wide and terms:
+            found["terms"] = ["for (int i = 1; i < k; i++) {", *indented(terms), "}"]
+        elif terms:
+            last = ["if (k % 2 == 0) {", *indented(["const int i = k - 1;", *terms]), "}"]
+            each = ["for (int i = 1; i + 1 < k; i += 2) {", *indented(both), "}"]
+            found["terms"] = [*each, *last]
         return found
 
-    def _pair(self, parts: dict[str, list[str]]) -> None:
+    def _of_term(self, term: Term, further: int = 0) -> Operand:
+        """Term i of a sum, or the next one."""
+        i, rest = ("i + 1", "k - i - 1") if further else ("i", "k - i")
+        of_x = {"i": "i - 1", "i + 1": "i"}[i] if term.is_rate else i
+        x = self._row(term.x, of_x)
+        if term.is_weighted:
+            x = "*", ("+", "i", "1") if further else "i", x
+        return "*", x, self._row(term.y, rest)
+
+    def _pair(self, parts: dict[str, list[Item]]) -> None:
         """Add up two sums at once, with the same bits: their factors stand side by side."""
-        columns: dict[tuple[str, str], int] = {}
-        sums, terms, after, single = [], [], [], {name: term for term, name in self.sums.items()}
-        found = ((name, FACTORS.fullmatch(term)) for name, term in single.items())
-        left = {name: factors for name, factors in found if factors}
+        columns: dict[tuple[Value, Value], int] = {}
+        left = [term for term in self.sums if not term.is_weighted]
+        sums, terms, both, after = [], [], [], []
 
-        def cost(pair: tuple[str, str]) -> tuple[int, bool]:
+        def cost(pair: tuple[Term, Term]) -> tuple[int, bool]:
             """Count the columns that it adds; then prefer two sums with the same factor."""
-            sides = [(left[pair[0]][i], left[pair[1]][i]) for i in (1, 3)]
-            return sum(side not in columns for side in sides), all(a != b for a, b in sides)
+            sides = [(pair[0][i], pair[1][i]) for i in (0, 1)]
+            return sum(side not in columns for side in sides), all(a is not b for a, b in sides)
 
-        while both := [p for p in combinations(left, 2) if left[p[0]][2] == left[p[1]][2]]:
-            best, pair = min(both, key=cost), f"p{len(sums)}"
-            one, other = map(left.pop, best)
-            a, b = (columns.setdefault((one[i], other[i]), len(columns)) for i in (1, 3))
-            product = f"at[i{one[2]}][{a}].of LANE * at[k - i][{b}].of LANE"
-            sums.append(f"struct pair {pair} = {{{{0.0, 0.0}}}};")
-            terms.append(f"EACH {pair}.of LANE += {product};")
-            after += [f"const double {name} = {pair}.of[{i}];" for i, name in enumerate(best)]
-            single = {name: term for name, term in single.items() if name not in best}
-        own = [
-            f"at[k][{i}] = (struct pair){{{{row[{a}][k], row[{b}][k]}}}};"
-            for (a, b), i in columns.items()
-        ]
+        while pairs := [p for p in combinations(left, 2) if p[0].is_rate == p[1].is_rate]:
+            one, other = best = min(pairs, key=cost)
+            left = [term for term in left if term not in best]
+            a, b = (columns.setdefault((one[i], other[i]), len(columns)) for i in (0, 1))
+            name, before = f"p{len(sums)}", " - 1" * one.is_rate
+            product = f"at[i{before}][{a}].of LANE * at[k - i][{b}].of LANE"
+            after_it = f"at[i{'' if before else ' + 1'}][{a}].of LANE * at[k - i - 1][{b}].of LANE"
+            sums.append(Statement((f"struct pair {name} = {{{{0.0, 0.0}}}};",)))
+            terms.append(Statement((f"EACH {name}.of LANE += {product};",)))
+            both.append(Statement((f"EACH {name}.of LANE += {product} + {after_it};",)))
+            for i, term in enumerate(best):
+                after.append(Statement(("const double ", self.sums[term], f" = {name}.of[{i}];")))
         if not columns:
             return
-        parts["still"].append(f"struct pair at[SERIES_LENGTH][{len(columns)}];")
-        parts["start"] += ["for (int k = 0; k == 0 || k < first; k++) {", *indented(own), "}"]
-        parts["sums"] = sums + [f"double {name} = 0.0;" for name in single]
-        parts["terms"] = terms + [f"{name} += {term};" for name, term in single.items()]
-        parts["integrals"] = after + parts["integrals"]
-        parts["later"] += own
+        single = [i for i, term in enumerate(self.sums) if term in left or term.is_weighted]
+        for part, found in (("sums", sums), ("terms", terms), ("both", both)):
+            parts[part] = [*found, *(parts[part][i] for i in single)]
+        own = [
+            Statement((f"at[k][{i}] = (struct pair){{{{{row_a}, {row_b}}}}};",))
+            for (a, b), i in columns.items()
+            for row_a, row_b in [[f"row[{self.rows[value]}][k]" for value in (a, b)]]
+        ]
+        parts["still"].append(Statement((f"struct pair at[SERIES_LENGTH][{len(columns)}];",)))
+        each = [Statement(("    ", *item.parts)) for item in own]
+        head = Statement(("for (int k = 0; k == 0 || k < first; k++) {",))
+        parts["start"] = [*parts["start"], head, *each, Statement(("}",))]
+        parts["integrals"] = [*after, *parts["integrals"]]
+        parts["later"] = [*parts["later"], *own]
 
     def _sort_sums(self) -> None:
         """Put sums of one form side by side."""
-        forms = [self.forms[value] for value in self.columns]
 
-        def place(term: str) -> tuple:
-            of = [int(column) for column in re.findall(r"\[(\d+)\]", term)]
-            return term.startswith("i *"), [forms[column] for column in of], of
+        def place(term: Term) -> tuple:
+            of = [term.x, term.y]
+            return term.is_weighted, [self.forms[v] for v in of], [self.order[v] for v in of]
 
-        names = {self.sums[term]: f"s{i}" for i, term in enumerate(sorted(self.sums, key=place))}
-        self.sums = {term: names[self.sums[term]] for term in sorted(self.sums, key=place)}
-        self.later.lines = [
-            re.sub(r"\bs\d+\b", lambda name: names[name[0]], line) for line in self.later.lines
-        ]
+        self.sums = {term: self.sums[term] for term in sorted(self.sums, key=place)}
+        for i, to in enumerate(self.sums.values()):
+            to.index = i
 
-    def _row(self, value: Value, k: str) -> str:
+    def _row(self, value: Value, k: str) -> Place:
         """Where coefficient k is read."""
         if value in self.columns:
-            return f"at[{k}][{self.columns[value]}]"
-        return f"row[{self.rows[value]}][{k}]"
+            return Place(f"at[{k}][", self.columns[value], "]")
+        return Place("row[", self.rows[value], f"][{k}]")
 
-    def _places(self, value: Value, k: str) -> list[str]:
-        """Where coefficient k is written."""
-        public = f"row[{self.rows[value]}][{k}]" if value in self.rows else ""
-        return list(dict.fromkeys(place for place in (self._row(value, k), public) if place))
+    def _places(self, value: Value, k: str) -> list[Place]:
+        """Where coefficient k is written; it is read from the first place."""
+        public = [Place("row[", self.rows[value], f"][{k}]")] if value in self.rows else []
+        return [*([self._row(value, k)] if value in self.columns else []), *public]
 
     def _own_leaves(self, k: str) -> Leaves:
         """Coefficient k of all leaves."""
-        inputs = [key for key in self.leaves if key[0] == "input"]
-        own = {(s.op, s.name): f"row[{i}][{k}]" for s, i in self.rows.items() if s.op == "state"}
-        own |= {key: f"origin->inputs[{i}][{k}]" for i, key in enumerate(inputs)}
-        return {**self.leaves, **own, ("time", ""): "origin->t"}
+        own: dict[tuple[str, str], Operand] = {("time", ""): "origin->t"}
+        for s, i in self.rows.items():
+            if s.op == "state":
+                own[s.op, s.name] = Place("row[", i, f"][{k}]")
+        for i, key in enumerate(key for key in self.leaves if key[0] == "input"):
+            own[key] = Place("origin->inputs[", i, f"][{k}]")
+        return self.leaves.but(own)
 
     def _pairs(self, value: Value) -> list[tuple[Value, Value, str]]:
         """Arguments of a function that move, its derivatives by them, and the signs of these."""
@@ -258,127 +297,137 @@ class Series:
         """1 over it: a division for a step, not for each order, where others wait for it."""
         return self.graph.simple("/", self.graph.number(1.0), value)
 
-    def _change(self, x: Value, g: Value) -> str:
+    def _change(self, x: Value, g: Value) -> Operand:
         """The sum of i x_i g_(k-i) over i = 1 .. k - 1, over k; of a state by its rate."""
         f, moving = self._varying(x)
         rate = self.rates.get(moving)
         if rate is None or not rate.moves:
-            return f"over_k * {self._sum(x, g, 'i * ')}"
-        return f"h * {self._scaled_sum(self._row(rate, 'i - 1'), f, g)}"
+            self.has_over_k = True
+            return multiplied("over_k", self._sum(x, g, is_weighted=True))
+        return multiplied("h", self._scaled_sum(rate, f, g, is_rate=True))
 
-    def _sum(self, x: Value, y: Value, weight: str = "") -> str:
-        """The sum of x_i y_(k-i) over i = 1 .. k - 1, with a weight of each term."""
+    def _sum(self, x: Value, y: Value, is_weighted: bool = False) -> Operand:
+        """The sum of x_i y_(k-i) over i = 1 .. k - 1."""
         (f, x), (g, y) = self._varying(x), self._varying(y)
-        x, y = (x, y) if weight else sorted((x, y), key=self.order.__getitem__)
-        return self._scaled_sum(f"{weight}{self._row(x, 'i')}", times(self.graph, f, g), y)
+        x, y = (x, y) if is_weighted else sorted((x, y), key=self.order.__getitem__)
+        return self._scaled_sum(x, times(self.graph, f, g), y, is_weighted)
 
-    def _scaled_sum(self, x: str, factor: Value, y: Value) -> str:
+    def _scaled_sum(
+        self, x: Value, factor: Value, y: Value, is_weighted: bool = False, is_rate: bool = False
+    ) -> Operand:
         g, y = self._varying(y)
-        term = f"{x} * {self._row(y, 'k - i')}"
-        name = self.sums.setdefault(term, f"s{len(self.sums)}")
+        term = Term(x, y, is_weighted, is_rate)
+        found = self.sums.setdefault(term, Place("s", len(self.sums)))
         scale = self.still.of(times(self.graph, factor, g))
-        return name if scale == "1.0" else f"{scale} * {name}"
+        return found if scale == 1.0 else ("*", scale, found)
 
-    def _at(self, value: Value) -> str:
+    def _at(self, value: Value) -> Operand:
         """Coefficient k > 0."""
         for needed in in_order([value], self._coefficients):
             self._coefficients[needed] = self._coefficient(needed)
         return self._coefficients[value]
 
-    def _coefficient(self, value: Value) -> str:
-        """Return the C expression of coefficient k > 0, without operators; writes it to its row."""
+    def _coefficient(self, value: Value) -> Operand:
+        """Return the operand of coefficient k > 0; writes it to its row."""
         if not value.moves:
-            return "0.0"
-        leaf = self.later.leaves.get((value.op, value.name), "")
+            return 0.0
+        leaf = self.later.leaves.get((value.op, value.name))
         if value.op == "state":
             if value in self.columns:
-                self.later.lines.append(f"{self._row(value, 'k')} = {leaf};")
+                self.later.statements.append(store(self._row(value, "k"), leaf))
             return leaf
         if value.op == "input":
-            found = f"k < SERIES_INPUT_LENGTH ? {leaf} : 0.0"
+            found = "if", ("<", "k", "SERIES_INPUT_LENGTH"), leaf, 0.0
         elif value.op == "time":
-            found = "k == 1 ? origin->time_scale : 0.0"
+            found = "if", ("==", "k", "1"), "origin->time_scale", 0.0
         elif value.op in DERIVATIVES:
             found = self._of_function(value)
         else:
             found = self._of_operation(value)
-        if value not in self.rows and value not in self.columns:
-            is_plain = " " not in found and not found.startswith("-")
-            return found if is_plain else self.later.constant(found)
         targets = self._places(value, "k")
-        self.later.lines += [f"{target} = {found};" for target in targets]
+        if not targets:
+            return self.later.constant(found) if isinstance(found, tuple) else found
+        self.later.statements += [store(target, found) for target in targets]
         return targets[0]
 
-    def _of_function(self, value: Value) -> str:
-        pairs, found = self._pairs(value), ""
+    def _of_function(self, value: Value) -> Operand:
+        pairs, terms = self._pairs(value), []
         for x, g, sign in pairs:
             relative = "+" if sign == pairs[0][2] else "-"
             if g.moves:
-                found += f" {relative} {self._change(x, g)}"
-            found += f" {relative} {self._at(x)} * {self.start.of(g)}"
-        found = f"{pairs[0][2]}({found.removeprefix(' + ')})"
+                terms.append((relative, self._change(x, g)))
+            terms.append((relative, ("*", self._at(x), self.start.of(g))))
+        found = terms[0][1]
+        for relative, term in terms[1:]:
+            found = relative, found, term
+        found = ("negative", found) if pairs[0][2] else found
         if value.op not in (*STEEP, *GROWING):
             return found
         are_finite = reduce(
             partial(self.graph.value, "and"), (self.graph.value("isfinite", g) for _, g, _ in pairs)
         )
         is_known, otherwise = self.start.of(are_finite), self._where_steep(value)
-        if value in self.columns and "(" in otherwise:  # then the loop has no calls
-            steep = [f"    {place} = {otherwise};" for place in self._places(value, "k")]
-            self._late.append("\n".join([f"if (!{is_known}) {{", *steep, "}"]))
+        if value in self.columns and otherwise != 0.0:  # then the loop has no calls
+            steep = [store(place, otherwise) for place in self._places(value, "k")]
+            self._late.append(Block(("not", is_known), (steep,)))
             return found
-        return f"{is_known} ? {found} : {otherwise}"
+        return "if", is_known, found, otherwise
 
-    def _where_steep(self, value: Value) -> str:
+    def _where_steep(self, value: Value) -> Operand:
         """Return a coefficient, where a derivative is infinite, as if the function did not change.
 
         The method sees at the end of a step whether this fits. Some powers have a series.
         """
         x, exponent = value.arguments[0], value.arguments[-1]
         if value.op != "pow" or exponent.moves:
-            return "0.0"
+            return 0.0
         factor, varying = self._varying(x)
-        rows = [f"&{self._row(v, '0')}" for v in (varying, value)]
-        stride = str(len(self.columns) or 1)
-        given = (rows[0], self.still.of(factor), self.still.of(exponent), "k", rows[1], stride)
-        return formula("slopes_power", *given)
+        rows = [self._row(v, "0") for v in (varying, value)]
+        for row in rows:
+            row.before = f"&{row.before}"
+        given = (rows[0], self.still.of(factor), self.still.of(exponent), "k", rows[1])
+        return "slopes_power", *given, str(len(self.columns) or 1)
 
-    def _of_operation(self, value: Value) -> str:
+    def _of_operation(self, value: Value) -> Operand:
         a, b = value.arguments[0], value.arguments[-1]
         match value.op:
             case "if":
                 chosen = [self._at(x) for x in value.arguments[1:]]
-                return chosen[1] if is_unknown(value) else formula("if", self.still.of(a), *chosen)
+                return chosen[1] if is_unknown(value) else ("if", self.still.of(a), *chosen)
+            case op if op in WITHOUT_DERIVATIVES:
+                return self._at(b)
             case "+" | "-" if not b.moves:
                 return self._at(a)
             case "+" | "-" if not a.moves:
-                return self._at(b) if value.op == "+" else f"-{self._at(b)}"
+                return self._at(b) if value.op == "+" else ("negative", self._at(b))
             case "*" if a is b:
                 twice = self.start.of(self.graph.value("*", self.graph.number(2.0), a))
-                return f"{self._sum(a, a)} + {twice} * {self._at(a)}"
+                return "+", self._sum(a, a), ("*", twice, self._at(a))
             case "*" if a.moves and b.moves:  # last what is known last
                 a, b = sorted((a, b), key=lambda x: self.forms[x][0])
-                ends = f"{self._at(a)} * {self.start.of(b)} + {self.start.of(a)} * {self._at(b)}"
-                return f"{self._sum(a, b)} + {ends}"
+                rest = "+", self._sum(a, b), ("*", self._at(a), self.start.of(b))
+                return "+", rest, ("*", self.start.of(a), self._at(b))
             case "/" if b.moves:
-                end = f"{self._at(b)} * {self.start.of(value)}"
-                rest, over = f"({self._at(a)} - {self._sum(b, value)} - {end})", self._over(b)
-                product = f"{rest} * {self.start.of(over)}"
+                end = "*", self._at(b), self.start.of(value)
+                rest = "-", ("-", self._at(a), self._sum(b, value)), end
+                over = self._over(b)
+                product = "*", rest, self.start.of(over)
                 if self.is_wide:  # too many conditions
                     return product
                 is_known = self.start.of(self.graph.value("isfinite", over))
-                return f"{is_known} ? {product} : {rest} / {self.start.of(b)}"
+                return "if", is_known, product, ("/", rest, self.start.of(b))
             case "/":
-                return f"{self._at(a)} * {self.still.of(self._over(b))}"
+                return "*", self._at(a), self.still.of(self._over(b))
         given = [self._at(x) if x.moves else self.still.of(x) for x in value.arguments]
-        return formula(value.op, *given)
+        return called(value.op, *given)
 
 
-def _with_next(term: re.Match[str]) -> str:
-    """The sum of a term and of the next one."""
-    following = term[1].replace("i * ", "(i + 1) * ").replace("[i]", "[i + 1]")
-    following = following.replace("[i - 1]", "[i]")
-    return f"+= {term[1]} + {following.replace('k - i]', 'k - i - 1]')};"
+def multiplied(factor: Operand, term: Operand) -> Operand:
+    """The product of a factor and a sum with its scale, from the left."""
+    if isinstance(term, Place):
+        return "*", factor, term
+    _, scale, of = term
+    return "*", ("*", factor, scale), of
 
 
 def forms(values: Iterable[Value]) -> dict[Value, tuple[int, int]]:

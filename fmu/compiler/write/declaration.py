@@ -10,11 +10,11 @@ from declaration.load import read as read_declaration
 
 from ..expressions.expression import CONDITION, WHOLE, in_order
 from ..graph.graph import MOVING, Relation, Value
+from ..names import Field
 from ..read.content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
 from ..read.keys import NUMBERS
 from ..units import STANDARD, parsed, shown
 from . import c_events, c_model
-from .c_events import INDICATOR
 
 INSTANCE = Path(__file__).resolve().parents[3] / "src" / "instance"
 TIME = INSTANCE / "time_variable.toml"
@@ -101,7 +101,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         tables[mode] = _local(file.fields.count(mode)) | own
     for i, (name, relation) in enumerate(indicators.items()):
         tables[name] = {
-            **_local(INDICATOR.format(i)),
+            **_local(Field("z", i)),
             "unit": "1",
             **_dependencies(relation.distance, file),
             "description": "Distance from an event; 1 while it plays no role",

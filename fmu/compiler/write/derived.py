@@ -7,7 +7,6 @@ more operations, and other rounding.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,8 +18,8 @@ from ..graph.graph import STILL, Graph, Value, is_number
 from ..plain_c.interpreter import Interpreter
 from ..plain_c.memory import Array, Pointer, Structure, is_real, is_whole
 from ..plain_c.text import CTextError, Program, refused
-from .blocks import WIDTH, Blocks, wrapped
-from .c_code import indented
+from .blocks import Blocks
+from .c_text import WIDTH, indented
 
 Rates = Callable[[Value], tuple[Value, Value] | None]  # of a leaf; None: it rests
 Place = tuple[str | int, ...]  # a part of an argument, from its name
@@ -398,10 +397,7 @@ class Function:
                 own.append(head.rstrip())
                 head = " " * indent
             head += more
-        body = [part for line in indented(lines) for part in wrapped(line)]
-        words = set(re.findall(r"\w+", "\n".join(body)))
-        unread = [n for n in map(parameter_name, parameters) if n not in words]
-        return "\n".join([*own, head, *(f"    (void){n};" for n in unread), *body, "}"])
+        return "\n".join([*own, head, *indented(lines), "}"])
 
 
 def pointed(kind: Any) -> Any:

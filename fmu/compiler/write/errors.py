@@ -4,39 +4,42 @@ Running error analysis: Higham, Accuracy and Stability of Numerical Algorithms, 
 derivatives are 0 or infinite, a function is evaluated at the ends of what its arguments may be.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import reduce
 from itertools import product
 
 from ..expressions.expression import in_order
 from ..graph.graph import CONDITIONS, Graph, Value
 from ..graph.tables import LookupTable
-from .c_code import Code, Leaves, formula
+from .c_code import Code, called
+from .statements import Operand, Place
 
-NONE = "0.0"
+NONE = 0.0
 ROUNDING = "DBL_EPSILON"  # of an operation and of a function, over its result
 NEVER_STEEPER_THAN_1 = ("sin", "cos", "atan", "tanh", "hypot")
 
 
 class Errors:
-    """C expressions of errors, as constants of a code; leaves without `given` errors are exact."""
+    """Operands of errors, with constants of a code; leaves without `given` errors are exact."""
 
-    def __init__(self, graph: Graph, code: Code, given: Leaves) -> None:
+    def __init__(self, graph: Graph, code: Code, given: Mapping[tuple[str, str], Operand]) -> None:
         self.graph, self.code, self.given = graph, code, given
-        self.known: dict[Value, str] = {}
+        self.known: dict[Value, Operand] = {}
+        self.corners: dict[Operand, Value] = {}  # leaves for operands, in brackets no names
 
     def _arguments(self, value: Value) -> Sequence[Value]:
         """Return what it follows from; of a table what is looked up."""
         return self.graph.looked_up.get(value, (None, value.arguments))[1]
 
-    def of(self, root: Value) -> str:
+    def of(self, root: Value) -> Operand:
         """Return the error of a value, >= 0 in its unit."""
         for value in in_order([root], self.known, self._arguments):
             error = self._error(value)
-            is_name = error == NONE or error.isidentifier()
+            is_name = not isinstance(error, tuple | Place)
             self.known[value] = error if is_name else self.code.constant(error)
         return self.known[root]
 
-    def _error(self, value: Value) -> str:
+    def _error(self, value: Value) -> Operand:
         if value.op in CONDITIONS or value.leaves.isdisjoint(self.given):
             return NONE
         if (value.op, value.name) in self.given:
@@ -48,48 +51,53 @@ class Errors:
             case "negative":
                 return errors[0]
             case "if":
-                return (
-                    errors[1]
-                    if errors[1] == errors[2]
-                    else formula("if", arguments[0], *errors[1:])
-                )
+                same = errors[1] == errors[2]
+                return errors[1] if same else ("if", arguments[0], *errors[1:])
             case "+" | "-":
                 parts = errors
             case "*":
                 a, b = arguments
                 parts = [
-                    _product(errors[0], f"(fabs({b}) + {errors[1]})"),
-                    _product(errors[1], f"fabs({a})"),
+                    _product(errors[0], ("+", ("fabs", b), errors[1])),
+                    _product(errors[1], ("fabs", a)),
                 ]
             case "/":
                 parts = [
-                    _product(error, f"fabs({of} / {arguments[1]})")
-                    for error, of in zip(errors, ("1.0", y), strict=True)
+                    _product(error, ("fabs", ("/", of, arguments[1])))
+                    for error, of in zip(errors, (1.0, y), strict=True)
                 ]
             case op if op in NEVER_STEEPER_THAN_1:
                 parts = errors
             case op:
                 ends = [
-                    [f"{a} - {e}", f"{a} + {e}"] if e != NONE else [a]
+                    [("-", a, e), ("+", a, e)] if e != NONE else [a]
                     for a, e in zip(arguments, errors, strict=True)
                 ]
                 table = self.graph.looked_up[value][0] if op == "table" else None
                 corners = [
-                    self._in_table(table, corner) if table else formula(op, *corner)
+                    self._in_table(table, corner) if table else called(op, *corner)
                     for corner in product(*ends)
                 ]
                 pairs = zip(corners[::2], corners[1::2], strict=True)
-                spreads = [f"relations_spread({y}, {low}, {high})" for low, high in pairs]
-                parts = [" + ".join(spreads)]
+                spreads = [("relations_spread", y, low, high) for low, high in pairs]
+                parts = [reduce(_sum, spreads)]
         parts = [part for part in parts if part != NONE]
-        return " + ".join([*parts, f"{ROUNDING} * fabs({y})"])
+        return reduce(_sum, [*parts, ("*", ROUNDING, ("fabs", y))])
 
-    def _in_table(self, table: LookupTable, corner: Sequence[str]) -> str:
-        """Return the value of a table for arguments in C."""
-        given = [self.graph.value("parameter", name=f"({at})") for at in corner]
-        self.code.known |= {x: x.name for x in given}  # in brackets no name of the file
+    def _in_table(self, table: LookupTable, corner: Sequence[Operand]) -> Operand:
+        """Return the value of a table for operands."""
+        for at in corner:
+            if at not in self.corners:
+                leaf = self.graph.value("parameter", name=f"({len(self.corners)})")
+                self.corners[at] = leaf
+                self.code.known[leaf] = self.code.constant(at)
+        given = [self.corners[at] for at in corner]
         return self.code.of(self.graph.polynomial(table, given, True))
 
 
-def _product(error: str, factor: str) -> str:
-    return NONE if error == NONE else f"{error} * {factor}"
+def _sum(a: Operand, b: Operand) -> Operand:
+    return "+", a, b
+
+
+def _product(error: Operand, factor: Operand) -> Operand:
+    return NONE if error == NONE else ("*", error, factor)
