@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.support.generator import change, copied
+from tests.support.generator import change
 from tests.support.instances import STATES, instantiated
 from tests.support.paths import CARRIED, FOLDERS, ROOT
 from tests.support.programs import run
+from tests.support.rparm_project import BUILD
 from tests.support.tables import tables
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -179,7 +180,8 @@ def collect(variables: Path, output: Path, *names: str) -> subprocess.CompletedP
 @pytest.fixture
 def controller(tmp_path: Path) -> Path:
     """variables.toml of a copy of the controller, with one scenario and its reference."""
-    variables = copied("rp_controller", tmp_path)
+    made = BUILD / "fmu" / "RPController" / "model" / "variables.toml"
+    variables = Path(shutil.copy(made, tmp_path))
     model = ROOT / "models" / "rp_controller"
     scenario = Path("scenarios") / "controller_pd_gravity.toml"
     reference = Path("references") / "controller_pd_gravity"
