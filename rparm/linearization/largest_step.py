@@ -117,7 +117,8 @@ def factor(whole: np.ndarray) -> float:
     values, left, right = eig(whole, left=True)
     with np.errstate(divide="ignore"):
         rounding = ROUNDING * np.linalg.norm(whole) / np.abs((left.conj() * right).sum(axis=0))
-    return 1.0 if (np.abs(values) + rounding >= 1.0).any() else found
+    sizes = np.abs(values)  # of a chain of zeros the bound is infinite, but none comes near 1
+    return 1.0 if ((sizes > NEAR) & (sizes + rounding >= 1.0)).any() else found
 
 
 def _largest(

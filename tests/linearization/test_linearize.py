@@ -407,6 +407,8 @@ def test_a_motion_that_neither_grows_nor_dies_out_has_no_stable_step() -> None:
         whole = transition({"a": opposed}, [Connection("a", "x", "a", "u")], 0.01)
         assert factor(whole) == 1.0
     assert factor(np.diag([0.5, 1 - 1e-9])) == 1 - 1e-9
+    memory = [[1 - 1e-8, 0.5, 0], [0, 0, 1], [0, 0, 0]]  # a delay of two steps
+    assert factor(np.array(memory)) == 1 - 1e-8
 
 
 def test_what_no_power_leads_to_is_exactly_0() -> None:
