@@ -229,6 +229,7 @@ def test_a_condition_on_the_time_has_time_events(version: str) -> None:
     path = fmu.parent / version / fmu.name
     run = simulated(path, 2.0, 0.1, {}, fmi_type="ModelExchange")
     held = run["held"].astype(int).tolist()
+    assert {*run["most"]} == {2**16 - 1}
     assert [run["time"][i] for i in range(1, len(held)) if held[i] != held[i - 1]] == [0.25, 1.0]
     assert run["phase"] == pytest.approx(np.maximum(run["time"] - 0.25, 0.0), abs=1e-15)
     assert [(v["description"]) for v in declared(read(fmu.with_suffix(".toml")))["variables"]

@@ -246,6 +246,9 @@ def _kind(node: Node, given: list[Kind], kinds: Mapping[str, Kind]) -> Kind:
         elements = {*given[node.name.count("{}") :]}
         return elements.pop() if len(elements) == 1 else NUMBER
     is_whole = node.op == "number" and node.value.is_integer()
+    if node.op == "**" and {*given} == {WHOLE}:
+        exponent = node.arguments[1]
+        is_whole = exponent.op == "number" and exponent.value >= 0
     is_whole |= node.op in KEEP_WHOLE and {*given[node.op == "if" :]} == {WHOLE}
     return WHOLE if is_whole or node.op == "floor" else NUMBER
 
