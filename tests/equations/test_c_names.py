@@ -38,7 +38,7 @@ def test_equations_stand_under_their_names(tmp_path: Path) -> None:
         assert equation in lines
     assert "const double a_by_phi = " in function(source, "jacobian")
     for name in ("d_inertia", "dd_inertia", "d_der_omega"):
-        assert f"const double {name} = " in function(source, "propagate")
+        assert f"const double {name} = " in function(source, "derivatives")
 
 
 def test_an_element_stands_under_its_name_in_a_loop(tmp_path: Path) -> None:
