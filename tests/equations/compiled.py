@@ -81,6 +81,7 @@ class Model:
             subprocess.run([*command, f"-I{shared}", *sources, "-o", library, "-lm"], check=True)
             build_cache.of_user().put(key, {"model.so": library.read_bytes()})
         else:
+            library.unlink(missing_ok=True)  # one that is loaded stays as it is
             library.write_bytes(found["model.so"])
         self.library = ctypes.CDLL(str(library))
         self.words = Words.in_dll(self.library, "equations_model")
