@@ -20,7 +20,7 @@ from tests.equations.compiled import read  # noqa: E402
 
 OPERATIONS = {"+": add, "-": sub, "*": mul, "/": truediv, "negative": neg, "pow": pow}
 OPERATIONS |= {"number": float, "sin": hy.sin, "cos": hy.cos, "exp": hy.exp}
-ARM = ROOT / "tests/equations/arm.toml"
+ARM = ROOT / "models/rp_manipulator/rp_manipulator.toml"
 START = (0.3, 0.2, 0.0, 0.0)  # q1, q2, dq1, dq2
 STATES = ("q1", "q2", "dq1", "dq2")
 

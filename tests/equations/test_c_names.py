@@ -81,7 +81,7 @@ z = {{ value = "{name} * w + exp({name})" }}
 
 
 def test_constants_have_names_of_their_own(tmp_path: Path) -> None:
-    for name in ("drive", "axis", "rp/controller"):
+    for name in ("drive", "axis", "pwm"):
         source = written(tmp_path, name)
         for body in re.findall(
             r"^[\w *]+\([^;{]*\) \{\n(.*?)^\}", source, re.MULTILINE | re.DOTALL

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from rparm.fmi.fmu_file import read_model
 from rparm.runs import scenario
 from tests.equations import examples
-from tests.equations.examples import FOLDER, METHODS, MODELS, build, simulated
+from tests.equations.examples import FOLDER, METHODS, build, simulated
 
 example = partial(examples.example, make=build)
 
@@ -159,26 +159,6 @@ def test_a_thousand_turns_keep_energy_and_momentum() -> None:
     )
     for name in ("energy", "momentum"):
         assert np.max(np.abs(run[name] / run[name][0] - 1)) < 1e-12
-
-
-@pytest.mark.parametrize("case", range(6))
-@pytest.mark.parametrize("name", ["controller", "encoder"])
-def test_files_have_the_bits_and_references_of_c(fmu: Path, name: str, case: int) -> None:
-    chance, given = np.random.default_rng(case), MODELS["rp"][name]
-    paths = fmu.with_name(given["fmu"]), example(f"rp/{name}")
-    theirs, own = (read_model(path).variables for path in paths)
-    assert all(own[n].reference == theirs[n].reference for n in theirs.keys() & own.keys())
-    start = {n: v[chance.integers(3)] for n, v in given["values"].items()}
-    inputs = [n for n in own if own[n].causality == "input" and own[n].type == "Real"]
-    signals = np.zeros(40, [(n, "f8") for n in ("time", *inputs)])
-    signals["time"] = np.linspace(0.0, 0.3, 40)
-    for n in inputs:
-        signals[n] = np.cumsum(chance.normal(size=40)) / 20
-    first, second = (simulated(path, 0.3, 0.0037, start, input=signals) for path in paths)
-    for n in given["outputs"]:
-        assert (
-            np.array_equal(first[n], second[n]) and np.unique(first[given["outputs"][1]]).size > 5
-        )
 
 
 def test_a_new_scenario_can_set_elements() -> None:
