@@ -291,7 +291,10 @@ class Events:
         ).splitlines()
 
     def _rest(self) -> dict[str, list[str]]:
-        """When all states rest: where the conditions hold that make each rate 0."""
+        """When all states rest: where the conditions hold that make each rate 0.
+
+        Then nothing is integrated, and no event is located that the time or inputs lead to.
+        """
         conditions, zero = [], self.graph.number(0.0)
         for state in self.file.of("states"):
             rate = state.value
@@ -300,7 +303,7 @@ class Events:
             elif rate is not zero:
                 conditions = []
                 break
-        if not conditions:
+        if not conditions or self.located:
             return {"rest": [], "is_at_rest": []}
         code = Code(self.leaves)
         rests = code.of(reduce(partial(self.graph.value, "and"), conditions))

@@ -30,7 +30,6 @@ static enum status extend(const struct series_origin *origin, int first, int las
                             : extend_orders(origin, first, last, row);
 }
 """
-MOST_SHOWN = 8  # values of parameters in a message
 LONG = 500  # lines for derivatives in small code: compilers need less time
 FOLLOWED = "relations_followed(&relations, ROOM, values, time, &copy)"
 
@@ -315,11 +314,8 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[Field, Value
     return [f"if ({condition}) {{", *indented(code.lines()), "}"]
 
 
-def _message(file: ModelFile, code: Code, given: str, condition: Value) -> tuple[Operand, ...]:
-    """Format and arguments of a message, in which values stand in the place of {NAME}.
-
-    In a message without names there follow the parameters that the condition reads.
-    """
+def _message(file: ModelFile, code: Code, given: str) -> tuple[Operand, ...]:
+    """Format and arguments of a message, in which values stand in the place of {NAME}."""
     parts = re.split(r"\{(\w+(?:\[[0-9,]+\])?)\}", given)
     form, arguments = parts[0].replace("%", "%%"), []
     for name, rest in zip(parts[1::2], parts[2::2], strict=True):
@@ -329,11 +325,6 @@ def _message(file: ModelFile, code: Code, given: str, condition: Value) -> tuple
             shown, found = ("%g" if variable.is_real else "%d"), code.of(value)
             arguments += [", ", ("+", found, 0.0) if variable.is_real else ("(int)", found)]
         form += shown + rest.replace("%", "%%")
-    if not arguments:
-        read = [v for v in file.of("parameters") if (v.leaf.op, v.name) in condition.leaves]
-        shown = ", ".join(f"{v.name} = %g" for v in read[:MOST_SHOWN])
-        form += shown and f" ({shown})"
-        arguments = [part for v in read[:MOST_SHOWN] for part in (", ", code.of(v.leaf))]
     return text(form), *arguments
 
 
@@ -348,7 +339,7 @@ def _checks(file: ModelFile) -> list[str]:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
-        conditions.append((code.of(holds), _message(file, code, message, check.value)))
+        conditions.append((code.of(holds), _message(file, code, message)))
     refused = Statement(("return STATUS_INVALID_PARAMETERS;",))
     for condition, message in conditions:
         why = Statement(("(void)snprintf(text, size, ", *message, ");"))
