@@ -26,7 +26,11 @@
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
 #define NOINLINE      __attribute__((noinline))
 /* Stands in front of a function whose code is to be small rather than fast. */
+#if defined(__clang__)
+#define SELDOM_CALLED __attribute__((cold, minsize))
+#else
 #define SELDOM_CALLED __attribute__((cold))
+#endif
 
 /* Stands in front of a loop in which no iteration depends on another. */
 #if defined(__clang__)

@@ -202,7 +202,8 @@ def test_programs_of_every_platform_prove_the_same(row: Platform, tmp_path: Path
         missing(f"missing: {error}")
     for case in problems.SMALL.values():
         answer = tmp_path / "answer"
-        script = 'input=$1 answer=$2; shift 2; exec "$@" <"$input" >"$answer"'
+        # 1: an event ends the proof
+        script = 'input=$1 answer=$2; shift 2; "$@" <"$input" >"$answer" || [ $? = 1 ]'
         (tmp_path / "asked").write_text("".join(case.problem), encoding="utf-8")
         finish(["sh", "-c", script, "sh", str(tmp_path / "asked"), str(answer), *command], tmp_path)
         case.run()
@@ -224,7 +225,7 @@ def proven(document: str) -> dict:
 # ---- The whole wheel -----------------------------------------------------------------------------
 
 
-UNPACKED = 22_000_000  # bytes; what it needs, with pip, has 230 MB more
+LARGEST = 22_000_000  # bytes to download; what it needs, with pip, has 230 MB unpacked
 OF_CHECKOUT = ("./run.sh", "./setup.sh", "build/venv", "build/report")
 
 
@@ -233,8 +234,8 @@ def checkout(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def test_it_is_small_and_for_every_platform(wheel: Path) -> None:
+    assert wheel.stat().st_size < LARGEST
     with zipfile.ZipFile(wheel) as archive:
-        assert sum(member.file_size for member in archive.infolist()) < UNPACKED
         names = archive.namelist()
         (metadata,) = [name for name in names if name.endswith(".dist-info/WHEEL")]
         assert "Root-Is-Purelib: true" in archive.read(metadata).decode()

@@ -179,7 +179,8 @@ def test_no_room_for_errors(place: Place, unbuffered: str) -> None:
 
 
 def test_names_that_the_output_cannot_encode(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "rparm", tmp_path / "rparm")
+    for part in ("rparm", "fmu/compiler"):
+        shutil.copytree(ROOT / part, tmp_path / part)
     model = tmp_path / "models" / "m"
     (model / "scenarios").mkdir(parents=True)
     text = (
