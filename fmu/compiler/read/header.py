@@ -36,11 +36,9 @@ class Field:
 
     @property
     def c_type(self) -> str:
-        """Its type in C."""
-        kind = self._type
-        if isinstance(kind, list | dict):
-            return f"enum {self.prefix}_{self.name}"
-        return "int" if kind in (BOOLEAN, INTEGER) else "double"
+        """Its type in C; an enumeration is an int with the values of an enum."""
+        is_whole = isinstance(self._type, list | dict) or self._type in (BOOLEAN, INTEGER)
+        return "int" if is_whole else "double"
 
     @property
     def _type(self) -> Any:
