@@ -270,6 +270,7 @@ class Events:
             switches=self._switches(),
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located),
+            has_located=str(bool(self.located)).lower(),
             next_time=NEXT_TIME if timed or file.sampled else [],
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
@@ -306,7 +307,7 @@ class Events:
         if not conditions or self.located:
             return {"rest": [], "is_at_rest": []}
         code = Code(self.leaves)
-        rests = code.of(reduce(partial(self.graph.value, "and"), conditions))
+        rests = code.of(reduce(partial(self.graph.value, "and"), dict.fromkeys(conditions)))
         code.statements.append(Statement(("return ", ("!=", rests, 0), ";")))
         head = ["static bool is_at_rest(const void *values_pointer) {"]
         head += ["    const struct equations_values *values = values_pointer;"]
