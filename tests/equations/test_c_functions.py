@@ -11,7 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.equations.compiled import Model, ModelFileError, c_model, declaration, read_text
+from tests.equations.compiled import (
+    Model,
+    ModelFileError,
+    c_model,
+    declaration,
+    read,
+    read_text,
+)
 from tests.equations.examples import MISTAKES, MODELS
 from tests.support.tables import cases
 
@@ -181,3 +188,17 @@ def test_mutants_are_read_or_refused_in_a_line(tmp_path: Path, seed: int) -> Non
 def test_a_name_that_is_no_c_file_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(ModelFileError, match="line 2: code: expected a C file such as crane.c, "):
         read_text(tmp_path, f'name = "M"\ncode = {name}\n[inputs]\nu = {{}}\n')
+
+
+def test_relations_are_named_where_they_stand(tmp_path: Path) -> None:
+    """Of the file and of its C, each by its own text."""
+    (tmp_path / "wall.c").write_text(
+        "double wall(double x) {\n    return x < 0.0 ? -x : 0.0;\n}\n", encoding="utf-8"
+    )
+    path = tmp_path / "wall.toml"
+    path.write_text(
+        'name = "Wall"\ncode = "wall.c"\n[states]\nx = { start = 1, derivative = "y" }\n'
+        '[where]\ny = "-1 if x > 0.5 else wall(x)"\n',
+        encoding="utf-8",
+    )
+    assert read(path).relation_texts == ["x > 0.5 of [where] y", "x < 0.0 of wall.c:2"]

@@ -78,7 +78,7 @@ class Program:
 class Preprocessor:
     """The text of a file with all that it includes, with marks where each line is from.
 
-    `made` gives the text of a header that is made, or None; it is asked before the file is read.
+    `made` gives the text of an included header that is made, or None.
     """
 
     def __init__(
@@ -93,13 +93,12 @@ class Preprocessor:
         self.lines: list[str] = []
         self.room = LARGEST_TEXT
 
-    def add(self, path: Path, shown: str) -> None:
-        """Add a file; shown: its name in messages."""
+    def add(self, path: Path, shown: str, made: str | None = None) -> None:
+        """Add a file; shown: its name in messages; made: its text, if it is made."""
         self.files.append(path)
         self.lines.append(f'# 1 "{shown}"')
         skipping: list[bool] = []  # of each #ifndef that is open
-        text = self.made(path)
-        text = self.content(path, shown) if text is None else text
+        text = self.content(path, shown) if made is None else made
         for number, line in enumerate(without_comments(text, shown).split("\n"), 1):
             place = f"{shown}:{number}"
             found = DIRECTIVE.fullmatch(line.strip())
@@ -160,9 +159,10 @@ class Preprocessor:
             )
         for folder in (path.parent, *self.folders):
             header = folder / own
-            if header.is_file() or self.made(header) is not None:
+            made = self.made(header)
+            if header.is_file() or made is not None:
                 if header.resolve() not in [file.resolve() for file in self.files]:
-                    self.add(header, own)
+                    self.add(header, own, made)
                 return
         raise CTextError(f"{place}: {own}: no such file")
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -70,10 +71,6 @@ class CodeFile:
     functions: dict[str, Called]
     warnings: list[str]
     flat: dict[str, set[str]]  # functions without slope that a function calls
-
-    def calls(self, graph: Graph) -> Calls:
-        """Return the calls of its functions in a graph."""
-        return Calls(self.program, graph)
 
 
 def read(path: Path, made: Callable[[Path], str | None]) -> CodeFile:
@@ -171,8 +168,9 @@ class Calls(Interpreter):
             return self.graph.value(op, a, b)
         if len(self.graph.relations) > MOST_RELATIONS:
             raise refused(node, f"the model has more than {MOST_RELATIONS} conditions that move")
+        before = len(self.graph.relations)
         found = super().relation(op, a, b, node)
-        for name in self.graph.relations.keys() - self.relation_texts.keys():
+        for name in islice(self.graph.relations, before, None):
             place = f"{node.coord.file}:{node.coord.line}"
             self.relation_texts[name] = f"{CGenerator().visit(node)} of {place}"
         return found

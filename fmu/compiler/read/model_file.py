@@ -41,7 +41,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     # without states nothing is integrated: outputs follow at once
     has_switches = bool(file.of("states") or file.events)
     graph = file.graph = Graph(tables=file.tables, has_switches=has_switches)
-    calls = file.code.calls(graph) if file.code else None
+    calls = Calls(file.code.program, graph) if file.code else None
     for variable in file.of(*LEAVES):
         op = "mode" if variable.kind == CONDITION else LEAVES[variable.section]
         variable.leaf = graph.value(op, name=variable.name)
