@@ -93,8 +93,8 @@ struct model_events {
      * same as after the last update. False or NULL if not known. */
     bool (*moves_on)(const void *values);
 
-    /* True if every state's derivative is 0 in these modes, whatever the inputs are. NULL if the
-     * model has no states. */
+    /* True if every state's derivative is 0 in these modes, whatever the inputs are: nothing is
+     * integrated then, and no indicator is followed. NULL if the model has no states. */
     bool (*is_at_rest)(const void *values);
 
     /* Writes the kind of each indicator in these modes. */

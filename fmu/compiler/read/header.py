@@ -49,7 +49,7 @@ class Field:
         """Indexes of an array."""
         if "[" not in self.elements[0]:
             return []
-        indexes = [[*map(int, re.findall(r"(?<=[\[,])\d+", name))] for name in self.elements]
+        indexes = map(_indexes, self.elements)
         return [range(min(column), max(column) + 1) for column in zip(*indexes, strict=True)]
 
     def lines(self) -> Iterator[str]:
@@ -73,8 +73,8 @@ class Field:
         """Yield the places of variables, from the field."""
         sizes = self.sizes
         for name in self.elements:
-            indexes = map(int, re.findall(r"(?<=[\[,])\d+", name))
-            yield (self.name, *(i - s.start for i, s in zip(indexes, sizes, strict=True))), name
+            pairs = zip(_indexes(name), sizes, strict=True)
+            yield (self.name, *(i - size.start for i, size in pairs)), name
 
 
 class Header:
@@ -155,6 +155,11 @@ class Header:
     def has_parameters(self) -> bool:
         """Whether there is a struct of parameters."""
         return bool(self.own) or any(header.has_parameters for header in self.inner)
+
+
+def _indexes(name: str) -> list[int]:
+    """Return the indexes of an element."""
+    return [*map(int, re.findall(r"(?<=[\[,])\d+", name))]
 
 
 def _struct(name: str, fields: Iterable[str]) -> list[str]:
