@@ -233,8 +233,9 @@ struct model {
     /* Writes derivatives of the calculated fields along a curve in the space of parameters, inputs,
      * states and time. values: a point of the curve, its calculated fields up to date. first,
      * second: value structures whose parameters, inputs and states hold the first and second
-     * derivatives along the curve; their calculated fields are written. second may be NULL. t in s;
-     * dt: derivative of the time along the curve, which is straight in time. */
+     * derivatives along the curve; their calculated fields are written. second may be NULL;
+     * if it is not, parameters rest along the curve. t in s; dt: derivative of the time along the
+     * curve, which is straight in time. */
     enum status (*derivatives)(const void *values, double t, double dt, void *first, void *second);
 
     /* Returns STATUS_OK if the parameters are consistent; otherwise STATUS_INVALID_PARAMETERS and,

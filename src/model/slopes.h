@@ -30,6 +30,11 @@ static inline double slopes_product(double a, double of_b, double of_a) {
     return a * of_b;
 }
 
+/* Returns the product of two derivatives, 0 if one of them is 0. */
+static inline double slopes_both(double a, double b) {
+    return a == 0.0 || b == 0.0 ? 0.0 : a * b;
+}
+
 /* Returns the derivative of a / b, from its product with b. */
 static inline double slopes_over(double product, double b) {
     return product == 0.0 ? 0.0 : product / b;

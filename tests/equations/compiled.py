@@ -114,10 +114,12 @@ class Model:
         self._call("outputs", values, ctypes.c_double(t))
 
     def derivatives(
-        self, values: np.ndarray, t: float, dt: float, first: np.ndarray, second: np.ndarray
-    ) -> None:
-        """Write the calculated fields of first and second derivatives."""
-        self._call("derivatives", values, ctypes.c_double(t), ctypes.c_double(dt), first, second)
+        self, values: np.ndarray, t: float, dt: float, first: np.ndarray,
+        second: np.ndarray | None,
+    ) -> None:  # fmt: skip
+        """Write the calculated fields of first and, while parameters rest, second derivatives."""
+        below = ctypes.c_void_p() if second is None else second
+        self._call("derivatives", values, ctypes.c_double(t), ctypes.c_double(dt), first, below)
 
     def jacobian(self, values: np.ndarray, t: float) -> np.ndarray:
         """Derivatives of the states' derivatives by the states."""

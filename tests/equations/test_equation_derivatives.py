@@ -70,17 +70,20 @@ def close(found: float, expected: mpmath.mpf, scale: float = 1.0) -> None:
     assert abs(found - expected) <= BOUND * max(scale, abs(expected)), (found, expected)
 
 
-def test_values_and_derivatives_along_a_curve(case: tuple) -> None:
+@pytest.mark.parametrize("order", [1, 2])
+def test_values_and_derivatives_along_a_curve(case: tuple, order: int) -> None:
+    """A parameter moves where only first derivatives are asked for."""
     model, texts, point, chance = case
     values = model.values(**point)
+    moving = NAMES if order == 1 else NAMES[1:]
     first, second = (
-        model.values(**{name: chance.uniform(-1, 1) for name in NAMES}) for _ in range(2)
+        model.values(**{name: chance.uniform(-1, 1) for name in moving}) for _ in range(2)
     )
     dt = chance.uniform(0.5, 1)
     model.outputs(values, point["time"])
     curves = {n: [v[model.names.index(n)] for v in (values, first, second)] for n in NAMES}
     curves["time"] = [point["time"], dt, 0.0]
-    model.derivatives(values, point["time"], dt, first, second)
+    model.derivatives(values, point["time"], dt, first, second if order == 2 else None)
     for name, text in texts.items():
         function = reference(text)
 
@@ -88,10 +91,10 @@ def test_values_and_derivatives_along_a_curve(case: tuple) -> None:
             return function(**{n: a + b * s + c * s**2 / 2 for n, (a, b, c) in curves.items()})
 
         with mpmath.workdps(40):
-            coefficients = mpmath.taylor(along, 0, 2)
+            coefficients = mpmath.taylor(along, 0, order)
         at = model.names.index(field(name))
-        for order, found in enumerate((values[at], first[at], second[at])):
-            close(found, coefficients[order] * (order or 1), scale=10.0**order)
+        for k, found in enumerate((values[at], first[at], second[at])[: order + 1]):
+            close(found, coefficients[k] * (k or 1), scale=10.0**k)
 
 
 def test_jacobian(case: tuple) -> None:
@@ -175,11 +178,14 @@ def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
         head = 'name = "M"\n[parameters]\np = { start = 0 }\n'
         model = Model(tmp_path / name, f'{head}[states]\nx = {{ derivative = "{rate}" }}\n')
         values = model.values(x=0.7, p=0.0)
-        first, second = (model.values(x=x, p=0.3) for x in (0.2, -0.4))
+        by_parameter, first, second = (
+            model.values(x=x, p=p) for x, p in ((0.2, 0.3), (0.2, 0.0), (-0.4, 0.0))
+        )
         model.outputs(values, 0.0)
+        model.derivatives(values, 0.0, 1.0, by_parameter, None)
         model.derivatives(values, 0.0, 1.0, first, second)
         series = model.series(values, 0.0, 0.5, np.zeros((1, 4)), 20)
-        found.append([values, first, second, model.jacobian(values, 0.0), series])
+        found.append([values, by_parameter, first, second, model.jacobian(values, 0.0), series])
     for branch, alone in zip(*found, strict=True):
         np.testing.assert_array_equal(branch, alone)
         assert np.all(np.isfinite(branch))

@@ -532,27 +532,31 @@ class Graph:
                 of_first = y.arguments[1] if is_unknown(y) else d[1]
                 return of_first if of_first is d[2] else self.value("if", a, of_first, d[2])
             case "/" | "slopes_over":
-                rest = self.simple("-", d[0], self._scaled(y, d[1], is_runtime(d[1])))
-                is_plain = b.op == "number" or not self.is_guarded or not is_runtime(rest)
-                return self.simple("/", rest, b) if is_plain else self.value("slopes_over", rest, b)
+                rest = self.simple("-", d[0], self.scaled(y, d[1], is_runtime(d[1])))
+                return self.over(rest, b)
             case "*" | "slopes_product":
                 b = y.arguments[1]
-                return self.simple("+", self._product(b, d[0], d[1]), self._product(a, d[1], d[0]))
+                return self.simple("+", self.product(b, d[0], d[1]), self.product(a, d[1], d[0]))
             case "slopes_bounded":
                 return d[0]
             case "slopes_scaled":
-                return self.simple("+", self._scaled(d[0], b), self._scaled(a, d[1]))
-        total, is_steep = self.number(0.0), y.op in STEEP or y.op.startswith("slopes_")
+                return self.simple("+", self.scaled(d[0], b), self.scaled(a, d[1]))
+        total = self.number(0.0)
         for slope, of_argument in zip(self.slopes(y), d, strict=True):
-            total = self.simple("+", total, self._scaled(slope, of_argument, is_steep))
+            total = self.simple("+", total, self.scaled(slope, of_argument, is_steep(y)))
         return total
 
-    def _scaled(self, slope: Value, d: Value, is_steep: bool = True) -> Value:
+    def scaled(self, slope: Value, d: Value, is_steep: bool = True) -> Value:
         """slope d; is_steep: it may not be finite, and is 0 where d is 0."""
         is_plain = not is_steep or not self.is_guarded or "number" in (slope.op, d.op)
         return self.simple("*", slope, d) if is_plain else self.value("slopes_scaled", slope, d)
 
-    def _product(self, a: Value, of_b: Value, of_a: Value) -> Value:
+    def over(self, product: Value, b: Value) -> Value:
+        """product / b; in the derivative of a quotient, 0 where the product is 0."""
+        is_plain = b.op == "number" or not self.is_guarded or not is_runtime(product)
+        return self.simple("/", product, b) if is_plain else self.value("slopes_over", product, b)
+
+    def product(self, a: Value, of_b: Value, of_a: Value) -> Value:
         """a db, in the derivative of the product a b."""
         known = a.functions.intersection(FALLIBLE) | of_b.functions.intersection(STEEP)
         is_plain = known <= {"/"} if not is_runtime(of_b) else not known
@@ -595,6 +599,11 @@ def is_of_time(value: Value) -> bool:
 def is_runtime(value: Value) -> bool:
     """Return whether it may be 0 in one call and not in another."""
     return any(op in RUNTIME for op, _ in value.leaves)
+
+
+def is_steep(value: Value) -> bool:
+    """Return whether slopes of the operation may be infinite or undefined."""
+    return value.op in STEEP or value.op.startswith("slopes_")
 
 
 def is_unknown(value: Value) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..expressions.expression import RELATIONS, in_order
 from ..graph.band import band
+from ..graph.curve import Curve
 from ..graph.graph import FALLIBLE, Value, is_number
 from ..names import Field
 from ..read.content import OPTIONS, ModelFile
@@ -259,27 +260,25 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
     fields |= {file.fields.value(v.name): v.value for v in file.calculated_reals}
     fields |= events.indicators()
     fields |= {tick.field: tick.value for tick in ticks(file)}
-    seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
+    rates = {graph.value("time"): (graph.value("first"), graph.number(0.0))}
     for variable in file.of("parameters", "inputs", "states", "discrete"):
-        first = seeds[variable.leaf] = graph.value("first", name=variable.name)
-        seeds[first] = graph.value("second", name=variable.name)
-    first_of: dict[Value, Value] = {}
-    second_of: dict[Value, Value] = {}
-    firsts = graph.derivatives(fields.values(), seeds, first_of)
-    seconds = graph.derivatives(firsts, seeds, second_of)
-    found = [(first_of[value], name) for value, name in graph.names.items() if value in first_of]
-    names = {second_of[first]: f"dd_{name}" for first, name in found if first in second_of}
-    names |= {first: f"d_{name}" for first, name in found}
-    curve, sections = Code(leaves(file), names=names), []
-    for structure, order in (("first", firsts), ("second", seconds)):
-        targets = [field_of(structure, field, field) for field in fields]
-        curve.assign(dict(zip(targets, order, strict=True)))
-        sections.append(curve.statements)
-        curve.statements = []
+        orders = (graph.value(order, name=variable.name) for order in ("first", "second"))
+        rates[variable.leaf] = tuple(orders)
+    curve = Curve(graph, rates.get)
     real = [v for v in file.started if v.is_real]
     started = {file.fields.value(v.name): v.initial.value for v in real}
-    start_firsts = graph.derivatives(started.values(), seeds)
-    start_seconds = graph.derivatives(start_firsts, seeds)
+    start_firsts, firsts = curve.first(started.values()), curve.first(fields.values())
+    start_seconds, seconds = curve.second(started.values()), curve.second(fields.values())
+    names = {}
+    for prefix, found in (("dd", curve.seconds), ("d", curve.firsts)):
+        of = [(found[value], name) for value, name in graph.names.items() if value in found]
+        names |= {value: f"{prefix}_{name}" for value, name in of}
+    code, sections = Code(leaves(file), names=names), []
+    for structure, order in (("first", firsts), ("second", seconds)):
+        targets = [field_of(structure, field, field) for field in fields]
+        code.assign(dict(zip(targets, order, strict=True)))
+        sections.append(code.statements)
+        code.statements = []
     outputs = Code(leaves(file))
     outputs.assign({field_of("to", field, field): value for field, value in fields.items()})
     for v in file.calculated_counts:
