@@ -6,7 +6,8 @@
 function(add_ssp name)
   cmake_parse_arguments(ARG "" "FOLDER" "FMUS" ${ARGN})
   set(loop ${PROJECT_SOURCE_DIR}/${ARG_FOLDER}/loop.toml)
-  file(GLOB writer CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/rparm/systems/*.py)
+  file(GLOB writer CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/rparm/systems/*.py
+       ${PROJECT_SOURCE_DIR}/rparm/templates/*.ss*)
   foreach(version IN LISTS FMI_VERSIONS)
     set(target ${name}${${version}_suffix}_ssp)
     set(below ${${version}_below})

@@ -6,6 +6,7 @@ the FMI cross-check.
 
 import codecs
 import csv
+import json
 import lzma
 import math
 import os
@@ -120,6 +121,21 @@ def show(value: Any, longest: int = 40) -> str:
     except ValueError:  # an integer of more digits than Python writes
         text = "a very large number"
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
+def toml_value(value: Any) -> str:
+    """Write a text, number or truth as TOML does; UserError for a name that is not UTF-8."""
+    if not isinstance(value, str):
+        return str(value).lower() if isinstance(value, bool) else repr(value)
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise UserError(f"{value}: TOML has no such name, which is not UTF-8") from None
+    return json.dumps(value, ensure_ascii=False)
+
+
+def toml_key(name: str) -> str:
+    return name if re.fullmatch(r"[\w-]+", name, re.ASCII) else toml_value(name)
 
 
 def number_in(text: str) -> float:

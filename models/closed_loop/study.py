@@ -58,7 +58,7 @@ def study_coupling(ssp: Path, report: Path) -> dict[str, dict[str, object]]:
 # ---- Picture of a run ----------------------------------------------------------------------------
 def figure(ssp: OpenedSystem, outcome: Outcome) -> Figure:
     """Joints over their references, tracking errors, efforts, and the end effector's path."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(fname=STYLE):
         picture = Figure(figsize=(14, 9), layout="constrained")
         picture.get_layout_engine().set(w_pad=0.08, h_pad=0.06)
         axes = picture.subplot_mosaic(

@@ -139,7 +139,7 @@ def tracking_error(columns: Columns) -> float:
 # ---- the picture ---------------------------------------------------------------------------------
 def draw(measured: Mapping[tuple[str, str], tuple[list[float], float]]) -> Figure:
     """Errors over the step, and the error of the limit, by variant and method."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(fname=STYLE):
         picture = Figure(figsize=(13, 6), layout="constrained")
         for variant, axes in zip(VARIANTS, picture.subplots(1, 2, sharey=True), strict=True):
             for color, method in zip((RUN_COLOR, *ERROR_COLORS[:3]), METHODS, strict=True):

@@ -71,7 +71,7 @@ REST = Rest(
 # ---- Picture of a run ----------------------------------------------------------------------------
 def figure(ssp: OpenedSystem, outcome: Outcome) -> Figure:
     """Joints over their references, errors, efforts, modes, motors, wall, and the path."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(fname=STYLE):
         picture = Figure(figsize=(14, 14), layout="constrained")
         picture.get_layout_engine().set(w_pad=0.08, h_pad=0.06)
         axes = picture.subplot_mosaic(

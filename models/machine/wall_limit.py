@@ -249,7 +249,7 @@ def under_master(opened: OpenedSystem, fmus: Mapping[str, Fmu], order: str, inpu
 # ---- the picture ---------------------------------------------------------------------------------
 def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
     """Limits over the stiffness: theory, exact eigenvalues, and what has been measured."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(fname=STYLE):
         picture = Figure(figsize=(9, 6), layout="constrained")
         axes = picture.subplots()
         line = np.geomspace(0.8 * STIFFNESSES[0], 1.25 * STIFFNESSES[-1], 60)

@@ -13,7 +13,7 @@ import numpy as np
 from SALib.analyze import sobol
 from scipy.stats import rankdata
 
-from rparm import project
+from rparm import project, texts
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.job import LYAPUNOV, Job
 from rparm.campaign.planning import FAILURE, RUN, sampling_problem
@@ -206,8 +206,8 @@ class Page:
             maps=[self.map(i) for i in range(len(self.campaign.maps))],
         )
 
-    def command(self, run: int) -> pages.Command:
-        return pages.Command(f"{self.again} --replay {run}")
+    def command(self, run: int) -> texts.Command:
+        return texts.Command(f"{self.again} --replay {run}")
 
     @property
     def note(self) -> str:

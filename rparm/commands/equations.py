@@ -13,33 +13,6 @@ from rparm.files import NAME, check_for_windows, create, written
 
 SUFFIX = ".toml"
 MODELS_PAGE = "examples/models/README.md"
-MODEL_FILE = """\
-# A body on a spring: change it to what you simulate. examples/models/README.md explains the file.
-name = "{name}"
-description = "Body on a spring"
-experiment = {{ stop = 10.0, step = 0.01, tolerance = 1e-8 }}
-
-[parameters]                    # may be changed while the model runs
-mass = {{ start = 1.0, unit = "kg", min = 1e-6, description = "Mass of the body" }}
-k = {{ start = 4.0, unit = "N/m", description = "Of the spring" }}
-c = {{ start = 0.2, unit = "N.s/m", min = 0, description = "Of the damper" }}
-
-[inputs]                        # set from outside, 0 at the start unless given
-force = {{ unit = "N" }}
-
-[states]                        # derivative: by the time; states are outputs
-x = {{ start = 1.0, unit = "m", derivative = "v" }}
-v = {{ unit = "m/s", derivative = "(force - spring - c * v) / mass" }}
-
-[where]                         # results that others use, in any order
-spring = "k * x"
-
-[outputs]
-energy = {{ value = "(mass * v**2 + spring * x) / 2", unit = "J" }}
-
-[check]                         # of parameters; the text is the message if it does not hold
-"a body with neither spring nor damper drifts away" = "k > 0 or c > 0"
-"""
 
 
 def own_file(options: argparse.Namespace, kind: str) -> Path:
@@ -61,7 +34,8 @@ def add_new_model_options(parser: argparse.ArgumentParser) -> None:
 
 
 def do_new_model(options: argparse.Namespace) -> Ended:
-    from rparm import schemas  # takes long
+    from rparm import schemas  # take long
+    from rparm.texts import rendered
 
     path = own_file(options, "model")
     of_schema = path.with_name("model.schema.json")
@@ -70,7 +44,7 @@ def do_new_model(options: argparse.Namespace) -> Ended:
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     first = f"#:schema ./{of_schema.name}\n" if text else ""
-    create(path, first + MODEL_FILE.format(name=options.name))
+    create(path, first + rendered("new_model.toml", name=options.name))
     if text and not of_schema.exists():
         create(of_schema, text)
     verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"

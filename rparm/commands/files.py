@@ -17,7 +17,7 @@ from rparm.command_line import Ended, add_document, add_fmi, add_output
 from rparm.commands.equations import SUFFIX, own_file
 from rparm.errors import UserError, closest, placed
 from rparm.files import NAME, check_for_windows, copied, create, from_folder, read_toml, written
-from rparm.fmi.model import INPUTS, Model, Variable
+from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.interruption import temporary_folder
 from rparm.project import START, VERSIONS
 from rparm.runs import scenario
@@ -26,21 +26,6 @@ from rparm.units import NONE
 
 TOOLS = project.page("docs/use-in-your-tool.md")
 TUTORIAL = "docs/tutorial.md"
-SYSTEM_FILE = """\
-# A system of FMUs. Run it by {program} system FILE.toml.
-name = {name}
-step = {step!r}  # s: outputs reach the inputs that they feed after each step
-stop = {stop!r}  # s
-
-[components]
-{components}
-
-[connections]  # "component.input" = "component.output"
-{guesses}
-[inputs]  # other unconnected inputs keep their start values
-{inputs}
-[parameters]  # values other than the FMUs' own, as numbers or with a unit: "12 kg"
-"""
 
 
 def add_new_options(parser: argparse.ArgumentParser) -> None:
@@ -156,31 +141,26 @@ def _components(given: Sequence[str], folder: Path) -> dict[str, tuple[str, Mode
 
 def _system_file(name: str, components: Mapping[str, tuple[str, Model]]) -> str:
     """Write a system without connections, with guesses of them as comments."""
+    from rparm.texts import rendered  # takes long
+
     models = {name: model for name, (_, model) in components.items()}
     ends = any((model.experiment.stop or 0.0) > 0 for model in models.values())
     with placed("default experiments"):
         _, stop, step, _ = times(0.0, None if ends else scenario.USUAL_STOP, None, models)
-    guesses: list[str] = []
-    inputs: list[str] = []
+    guesses: list[tuple[str, str, str]] = []
+    inputs: list[tuple[str, Value, str]] = []
     for component, (_, model) in components.items():
         for variable in (x for x in model.variables.values() if x.is_a(INPUTS)):
-            key = f"# {scenario.toml_text(f'{component}.{variable.name}')} ="
-            unit = f"  # {' '.join(variable.unit.split())}" if variable.unit else ""
+            end, unit = f"{component}.{variable.name}", " ".join((variable.unit or "").split())
             feeding = _feeding(component, variable, components)
             nothing = False if variable.type == "Boolean" else 0.0
             start = nothing if variable.start is None else variable.written(variable.start)
-            constant = f"{key} {{ constant = {scenario.toml_value(start)} }}{unit}"
-            inputs += [] if feeding else [constant]
-            guesses += [f"{key} {scenario.toml_text(output)}{unit}" for output in feeding]
-    return SYSTEM_FILE.format(
-        program=project.PROGRAM,
-        name=scenario.toml_text(name),
-        step=step,
-        stop=stop,
-        components="\n".join(f"{x} = {scenario.toml_text(y)}" for x, (y, _) in components.items()),
-        guesses="".join(f"{line}\n" for line in guesses),
-        inputs="".join(f"{line}\n" for line in inputs),
-    )
+            inputs += [] if feeding else [(end, start, unit)]
+            guesses += [(end, output, unit) for output in feeding]
+    return rendered(
+        "new_system.toml", program=project.PROGRAM, name=name, step=step, stop=stop,
+        components=components, guesses=guesses, inputs=inputs,
+    )  # fmt: skip
 
 
 def _feeding(

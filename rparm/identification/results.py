@@ -3,19 +3,18 @@
 The files are a scenario that runs the log again, and the parameters as TOML and SSV.
 """
 
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from math import ceil, isfinite, log10
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.files import difference, from_folder, whole
+from rparm.files import difference, from_folder, toml_value, whole
 from rparm.fmi.model import Model, Value
 from rparm.identification.identify import Estimate, Identification
 from rparm.identification.request import DELAY
-from rparm.runs.scenario import toml_text
+from rparm.systems.ssp_writer import parameter_set
+from rparm.texts import rendered
 
 DIGITS = 6
 SCENARIO, PARAMETERS, PARAMETER_SET = "scenario.toml", "parameters.toml", "parameters.ssv"
@@ -97,11 +96,12 @@ def text(number: float | None, digits: int = DIGITS) -> str:
 # ---- Files ---------------------------------------------------------------------------------------
 def write_files(found: Identification, folder: Path, model: Model) -> list[Path]:
     """Write the files; their paths."""
-    values = {**found.checked.settings, **found.values}
+    set_values = found.checked.settings | found.values
+    values = {name: model.variables[name].written(x) for name, x in set_values.items()}
     texts = {
-        PARAMETERS: _parameters(values, model),
-        PARAMETER_SET: _set(values, model),
-        SCENARIO: "\n".join(_scenario(found, folder, model, values)),
+        PARAMETERS: rendered("identified.toml", scenario=False, values=values),
+        PARAMETER_SET: _set(set_values, model),
+        SCENARIO: _scenario(found, folder, values),
     }
     for name, text in texts.items():
         with whole(folder / name) as path:
@@ -109,72 +109,29 @@ def write_files(found: Identification, folder: Path, model: Model) -> list[Path]
     return [folder / name for name in texts]
 
 
-def _parameters(values: dict[str, Value], model: Model) -> str:
-    lines = [f"{name} = {_toml(model.variables[name].written(x))}" for name, x in values.items()]
-    return "\n".join(["[parameters]", *lines, ""])
-
-
-def _toml(value: Value) -> str:
-    return toml_text(value) if isinstance(value, str) else json.dumps(value)  # with all digits
-
-
 def _set(values: dict[str, Value], model: Model) -> str:
     """Write a parameter set of SSP 1.0."""
-    rows = [
-        f"    <ssv:Parameter name={quoteattr(name)}>"
-        f"<ssv:{kind} value={quoteattr(_toml(value))}/></ssv:Parameter>"
-        for name, value in values.items()
-        if (kind := model.variables[name].type) in TYPES
-    ]
-    head = (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        '<ssv:ParameterSet version="1.0" name="identified"\n'
-        '    xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">\n'
-    )
-    body = "\n".join(["  <ssv:Parameters>", *rows, "  </ssv:Parameters>"])
-    return f"{head}{body}\n</ssv:ParameterSet>\n"
+    types = {name: model.variables[name].type for name in values}
+    rows = [(n, types[n], toml_value(x), "") for n, x in values.items() if types[n] in TYPES]
+    return parameter_set("identified", rows)
 
 
-def _scenario(
-    found: Identification, folder: Path, model: Model, values: dict[str, Value]
-) -> Iterator[str]:
+def _scenario(found: Identification, folder: Path, values: Mapping[str, Value]) -> str:
     """Write a scenario over the first log, from its first segment's start state."""
-    log, times = found.recordings[0], found.recordings[0].times
-    start = float(found.segments[0].times[0])
-    steps = max(round((float(times[-1]) - start) / log.step), 1)
-    yield _subject(found, folder)
-    yield f"title = {_toml(f'Identified: {log.path.name}')}"
-    yield f"description = {_toml(f'Parameters fitted to {log.path.name}, compared with it')}"
-    yield f"tolerance = {found.request.tolerance!r}"
-    if DELAY in found.estimates:
-        late = found.estimates[DELAY].value
-        yield f"# what was measured is {late:.6g} s late: the comparison does not know it"
-    yield f"\n[time]\nstart = {start!r}\nstop = {float(times[-1])!r}"
-    yield f"step = {(float(times[-1]) - start) / steps:.12g}\n"
-    yield _parameters(values, model)
-    yield "[initial]"
-    for name, value in zip(found.states, found.start_states[0].tolist(), strict=True):
-        yield f"{name} = {value!r}"
-    file, time = from_folder(log.path, folder), found.request.columns.get("time", "time")
-    checked = found.checked
-    for section, columns in (
-        ("inputs", {**checked.reals, **checked.switches}),
-        ("measured", checked.outputs),
-    ):
-        for name, column in columns.items():
-            yield f"\n[{section}.{name}]\nfile = {_toml(file)}\ncolumn = {_toml(column.name)}"
-            yield f"time = {_toml(time)}"
-            if log.first:
-                yield f"begin = {difference(log.first, -start)!r}"
-            if section == "inputs":
-                yield "hold = true"
-            if column.one:
-                yield f"scale = {_toml(column.one)}"
-    yield ""
-
-
-def _subject(found: Identification, folder: Path) -> str:
+    log, checked = found.recordings[0], found.checked
+    start, stop = float(found.segments[0].times[0]), float(log.times[-1])
+    steps = max(round((stop - start) / log.step), 1)
+    delay = found.estimates[DELAY].value if DELAY in found.estimates else None
     try:
-        return f"model = {_toml(project.model(found.model).name)}"
+        key, subject = "model", project.model(found.model).name
     except UserError:
-        return f"fmu = {_toml(from_folder(found.fmu, folder))}"
+        key, subject = "fmu", from_folder(found.fmu, folder)
+    return rendered(
+        "identified.toml", scenario=True, key=key, subject=subject, log=log, values=values,
+        tolerance=found.request.tolerance, delay=delay, start=start, stop=stop,
+        step=(stop - start) / steps, file=from_folder(log.path, folder),
+        initial=dict(zip(found.states, found.start_states[0].tolist(), strict=True)),
+        time=found.request.columns.get("time", "time"),
+        begin=difference(log.first, -start) if log.first else None,
+        sections={"inputs": checked.reals | checked.switches, "measured": checked.outputs},
+    )  # fmt: skip

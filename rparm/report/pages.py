@@ -4,33 +4,22 @@ import base64
 import functools
 import gzip
 import lzma
-import os
 import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import quote
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-from rparm import project, units
+from rparm import project
 from rparm.files import from_folder, whole, write_text
 from rparm.report.run_data import RunData
+from rparm.texts import rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INDEX = "index.html"
-NUMERIC = re.compile(r"-?\d[\d.]*(e[+-]?\d+)?( m?s)?|nan|–")  # of cells aligned to the right
-_templates = Environment(
-    loader=FileSystemLoader(Path(__file__).parent / "templates"),
-    autoescape=True,
-    undefined=StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
-)
 ASSETS = "assets"  # in the report
 ASSET_SOURCES = Path(__file__).parent / "assets"
 PLOTLY = "plotly.js"
@@ -39,45 +28,7 @@ INK, MUTED, GRID = "#22303c", "#6b7885", "#e3e8ec"
 REFERENCE_COLOR, RUN_COLOR = "#a9c5de", "#1d4e79"
 ERROR_COLORS = ("#d1793a", "#2f8f83", "#7a5195", "#8a8d3f")
 DASHED = (0, (5, 3))
-STYLE = {
-    "font.size": 10,
-    "text.color": INK,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": MUTED,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.unicode_minus": True,
-    "axes.formatter.useoffset": False,
-    "grid.color": GRID,
-    "grid.linewidth": 0.8,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "legend.frameon": False,
-    "figure.facecolor": "white",
-    "savefig.dpi": 130,
-}
-
-_templates.filters |= {
-    "exponents": units.exponents,
-    "unit": units.unit,
-    "address": lambda path: quote(os.fsencode(path)),
-    "minus": units.minus,
-    "number": units.number,
-    "short": units.short,
-}
-_templates.tests |= {
-    "numeric": lambda cell: NUMERIC.fullmatch(str(cell)) is not None,
-    "command": lambda cell: isinstance(cell, Command),
-}
-
-
-class Command(str):
-    """Command to type, as a cell of a table."""
+STYLE = Path(__file__).with_name("figures.mplstyle")  # of matplotlib
 
 
 @dataclass(frozen=True)
@@ -130,7 +81,7 @@ def write_alone(folder: Path, page: RunPage, root: str = "") -> Path:
 
 def write_page(path: Path, template: str, **values: object) -> Path:
     """Write a page, complete or not at all; return its path."""
-    write_text(path, _templates.get_template(template).render(values))
+    write_text(path, rendered(template, **values))
     return path
 
 
@@ -177,5 +128,5 @@ def save_figure(figure: "Figure", path: Path) -> None:
     """Write a picture in the style of all; complete or not at all."""
     import matplotlib as mpl  # takes long
 
-    with whole(path) as temporary, mpl.rc_context(STYLE):
+    with whole(path) as temporary, mpl.rc_context(fname=STYLE):
         figure.savefig(temporary, metadata={"Software": None})

@@ -6,9 +6,8 @@ checked against the description of the model's FMU. `template` writes a scenario
 
 import json
 import math
-import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -18,7 +17,7 @@ import numpy as np
 
 from rparm import project
 from rparm.errors import UserError, WrongValueError, did_you_mean
-from rparm.files import difference, is_file, missing, read_toml, show
+from rparm.files import difference, is_file, missing, read_toml, show, toml_value
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value, Variable
 from rparm.project import PROGRAM
 from rparm.runs.inputs import MEASURED, InputReader, Logged, Reader, Signal
@@ -35,34 +34,6 @@ SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins
 TEMPLATE_WIDTH = 100
 USUAL_STOP, USUAL_TOLERANCE = 2.0, 1e-8  # s; relative
 USUAL_STEPS = 200  # to the stop time, where the FMU proposes none
-TEMPLATE = """\
-# A scenario. Run it by {program} FILE.toml. Numbers are in SI units; in quotation marks a value may
-# have another one: "90 deg", "300 mm", "2kN".
-# "# name = value" is a start value as it is: remove the "# " to change it.
-{key} = {model}
-title = {title}
-description = "What happens, in a sentence or two."
-tolerance = {tolerance}  # of the integrator, relative: between 0 and 1
-
-# Results have every k-th communication point:
-# reference_every = 5
-{panels}
-[time]
-start = {start}  # s
-stop = {stop}  # s
-step = {step}  # s; or a pattern that is repeated until stop: [{step}, {shorter}]
-"""
-INPUT_HELP = """\
-# An input is one of
-#   constant = 1.5
-#   table = [[0.0, 0.0], [1.0, 1.5]]  # [time in s from start, value], linear in between
-#   sines = [{ amplitude = 1.5, frequency = 0.5, phase = 0.0 }]  # Hz, rad; `offset = 1.0` beside it
-#   file = "log.csv"  # of measurements, beside this file; `column = "tau"`, `time = "t"`,
-#                     # `scale = "1 kN"`, `begin = 1.5`, `hold = true` beside it
-# What was measured of an output is compared with it: [measured.NAME], with the keys of a file.
-# A Boolean one is `constant = true`, or a table that holds from each time on. An input that is not
-# here has its start value.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,20 +309,18 @@ def template(
 
     `begin` has values, by section, in place of start values.
     """
-    outputs = model.real_outputs[:2]
-    panels = "# Further plots, each of variables of one unit:\n"
-    panels += f"# panels = {json.dumps([[output] for output in outputs])}\n"
-    given = {"key": key, "model": toml_text(subject), "title": toml_text(name), "panels": panels}
-    given |= {name: _toml_number(number) for name, number in _template_times(model).items()}
-    parts = [TEMPLATE.format(program=PROGRAM, **given)]
-    parts += _template_section(PARAMETERS, "Parameters.", model)
-    parts += _template_section(INITIAL, "State at the start.", model, begin.get(INITIAL, {}))
-    inputs = [variable for variable in model.variables.values() if variable.is_a(INPUTS)]
-    if inputs:
-        parts.append(
-            INPUT_HELP + "\n".join(_template_input(x, begin.get(INPUTS, {})) for x in inputs)
-        )
-    return "\n".join(parts)
+    from rparm.texts import rendered  # takes long
+
+    known = [v for v in model.variables.values() if v.start is not None and v.type != "String"]
+    sections = {PARAMETERS: "Parameters.", INITIAL: "State at the start."}
+    inputs = [v for v in model.variables.values() if v.is_a(INPUTS)]
+    times = {name: _toml_number(number) for name, number in _template_times(model).items()}
+    return rendered(
+        "new_scenario.toml", program=PROGRAM, key=key, subject=subject, name=name, begin=begin,
+        panels=json.dumps([[output] for output in model.real_outputs[:2]]), **times,
+        sections={k: (title, [v for v in known if v.is_a(k)]) for k, title in sections.items()},
+        inputs=[v for v in inputs if v.type in ("Real", "Boolean")], comment=_template_comment,
+    )  # fmt: skip
 
 
 def _template_times(model: Model) -> dict[str, float]:
@@ -383,34 +352,6 @@ def _toml_number(number: float) -> str:
     return repr(number).replace("e-0", "e-")
 
 
-def toml_text(content: str) -> str:
-    """Write a text as TOML does; UserError for the name of a file that is not UTF-8."""
-    try:
-        content.encode()
-    except UnicodeEncodeError:
-        raise UserError(f"{content}: TOML has no such name, which is not UTF-8") from None
-    return json.dumps(content, ensure_ascii=False)
-
-
-def _template_section(
-    section: str, title: str, model: Model, begin: Mapping[str, Value] = MappingProxyType({})
-) -> Iterator[str]:
-    """Write a section with `begin`, and the start value of each other variable in a comment."""
-    known = [v for v in model.variables.values() if v.is_a(section) and v.start is not None]
-    known = [variable for variable in known if variable.type != "String"]
-    if known:
-        lines = [f"{_template_comment(x)}\n{_template_line(x, begin)}" for x in known]
-        yield f"# {title}\n[{section}]\n" + "\n".join(lines) + "\n"
-
-
-def _template_line(variable: Variable, begin: Mapping[str, Value]) -> str:
-    assert variable.start is not None
-    value = begin.get(variable.name, variable.written(variable.start))
-    mark = "" if variable.name in begin else "# "
-    line = f"{mark}{_toml_key(variable.name)} = {toml_value(value)}"
-    return f"{line}  # {variable.unit}" if variable.unit not in (None, "", "1") else line
-
-
 def _template_comment(variable: Variable) -> str:
     """Write meaning and limits of a variable, above the line that may be uncommented."""
     limits = []
@@ -419,25 +360,6 @@ def _template_comment(variable: Variable) -> str:
     if math.isfinite(variable.greatest) and variable.type == "Real":
         limits.append(f"at most {number(variable.greatest)}")
     if variable.items:
-        limits.append("one of " + ", ".join(map(toml_text, variable.items)))
+        limits.append("one of " + ", ".join(map(toml_value, variable.items)))
     meaning = "; ".join([" ".join(variable.description.split()) or variable.name, *limits])
     return textwrap.fill(meaning, TEMPLATE_WIDTH, initial_indent="#   ", subsequent_indent="#   ")
-
-
-def _toml_key(name: str) -> str:
-    return name if re.fullmatch(r"[\w-]+", name, re.ASCII) else toml_text(name)
-
-
-def toml_value(value: Value) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return toml_text(value) if isinstance(value, str) else repr(value)
-
-
-def _template_input(variable: Variable, begin: Mapping[str, Value]) -> str:
-    start = begin.get(variable.name, 0.0 if variable.start is None else variable.start)
-    unit = f"  # {variable.unit}" if variable.unit else ""
-    header = f"[{INPUTS}.{_toml_key(variable.name)}]\nconstant = {toml_value(start)}{unit}\n"
-    if variable.type not in ("Real", "Boolean"):
-        return ""
-    return f"{_template_comment(variable)}\n{header}"

@@ -10,7 +10,6 @@ import sys
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 from fmpy.model_description import BaseUnit
 
@@ -22,18 +21,13 @@ from rparm.interruption import temporary_folder
 from rparm.systems import loop_file
 from rparm.systems.python_component import ANY
 from rparm.systems.ssp import FMU_TYPE, NAMESPACES, STRUCTURE
-from rparm.systems.structure import ALONE, SETTABLE, Component, OpenedSystem
+from rparm.systems.structure import ALONE, SETTABLE, OpenedSystem
+from rparm.texts import rendered
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
 TYPED = ("Real", "Integer", "Boolean", "String")  # connectors
 DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
-HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
-STRUCTURES, COMMON, VALUES, OSP = (f'xmlns:{k}="{uri}"' for k, uri in NAMESPACES.items())
-SPACES = f"""{STRUCTURES}
-    {COMMON}
-    {OSP}
-    xmlns:oms="https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd\""""
 Sets = Mapping[str, Mapping[str, Mapping[str, Value]]]  # by variant, component and variable
 
 
@@ -127,136 +121,62 @@ class _Writer:
         files = {name: text.encode() for name, text in texts.items()}
         return files | {self.sources[name]: path.read_bytes() for name, path in self.fmus.items()}
 
-    # ---- The structure ---------------------------------------------------------------------------
     def structure(self) -> str:
         system = self.system
-        step, start, stop = map(_text, (system.step, system.start, system.stop))
         ends = [(c.start_component, c.start_connector, c.end_component, c.end_connector)
                 for c in system.connections]  # fmt: skip
-        connections = "".join(_connection(*end) for end in ends)
-        connections += "".join(_connection("", *entry) for entry in self.inputs)
-        if connections:
-            connections = f"    <ssd:Connections>\n{connections}    </ssd:Connections>\n"
-        elements = [self.component(i, c) for i, c in enumerate(system.components)]
-        own = "".join(self.connector(x, 0, 0.5, *of) for x, *of in self.inputs)
-        connectors = f"    <ssd:Connectors>\n{own}    </ssd:Connectors>\n" if own else ""
-        name = quoteattr(system.name)
-        said = f" description={quoteattr(system.description)}" if system.description else ""
         shown = [self.variable(c.name, name) for c in system.components for name in c.connectors]
-        return f"""{HEAD}<ssd:SystemStructureDescription version="1.0" name={name}{said}
-    {SPACES}>
-  <ssd:System name={name}>
-{connectors}    <ssd:Elements>
-{"".join(elements)}    </ssd:Elements>
-{connections}    <ssd:Annotations>
-      <ssc:Annotation type="org.openmodelica">
-        <oms:Annotations>
-          <oms:SimulationInformation>
-            <oms:FixedStepMaster description="oms-ma" stepSize="{step}"
-                absoluteTolerance="1e-8" relativeTolerance="1e-8"/>
-          </oms:SimulationInformation>
-        </oms:Annotations>
-      </ssc:Annotation>
-    </ssd:Annotations>
-  </ssd:System>
-{self.unit_list("ssd", shown)}\
-  <ssd:DefaultExperiment startTime="{start}" stopTime="{stop}">
-    <ssd:Annotations>
-      <ssc:Annotation type="com.opensimulationplatform">
-        <osp:Algorithm><osp:FixedStepAlgorithm baseStepSize="{step}"/></osp:Algorithm>
-      </ssc:Annotation>
-    </ssd:Annotations>
-  </ssd:DefaultExperiment>
-</ssd:SystemStructureDescription>
-"""
+        times = {name: _text(getattr(system, name)) for name in ("start", "stop", "step")}
+        return rendered(
+            "system.ssd", system=system, inputs=self.inputs, writer=self, spaces=NAMESPACES,
+            connections=[*ends, *(("", *entry) for entry in self.inputs)],
+            units=self.used(shown), typed=TYPED, fmu_type=FMU_TYPE, **times,
+        )  # fmt: skip
 
-    def component(self, number: int, component: Component) -> str:
-        """Return an element: inputs to its left, outputs to its right."""
-        name, connectors = component.name, ""
-        for x, kind in enumerate(("input", "output")):
-            shown = [c.name for c in component.connectors.values() if c.kind == kind]
-            for i, variable in enumerate(shown):
-                place = 1 - (i + 0.5) / len(shown)
-                connectors += "    " + self.connector(variable, x, place, name, variable)
-        variants = [variant for variant, of in self.sets.items() if name in of]
-        bindings = "".join(
-            f"          <ssd:ParameterBinding source={quoteattr(_set_file(name, variant))}/>\n"
-            for variant in [*variants, *variants[:1]]
-        )
-        if bindings:
-            bindings = f"""        <ssd:ParameterBindings>
-{bindings}        </ssd:ParameterBindings>
-"""
-        left = 70 * number
-        return f"""\
-      <ssd:Component name={quoteattr(name)} type="{FMU_TYPE}"
-          source={quoteattr(self.sources[name])} implementation="CoSimulation"
-          description={quoteattr(self.descriptions[name])}>
-        <ssd:Connectors>
-{connectors}        </ssd:Connectors>
-        <ssd:ElementGeometry x1="{left}" y1="0" x2="{left + 40}" y2="40"/>
-{bindings}      </ssd:Component>
-"""
+    def bound(self, component: str) -> list[str]:
+        """Return the files with the sets of a component; the first one is bound last, too."""
+        variants = [variant for variant, of in self.sets.items() if component in of]
+        return [_set_file(component, variant) for variant in [*variants, *variants[:1]]]
 
-    def connector(self, shown: str, x: int, y: float, component: str, name: str) -> str:
-        variable = self.variable(component, name)
-        # an Enumeration would have to be listed here: without a type it is the FMU's
-        typed = f"<ssc:{variable.type}{self.unit(variable)}/>" if variable.type in TYPED else ""
-        return (
-            f"      <ssd:Connector name={quoteattr(shown)} kind={quoteattr(variable.causality)}>"
-            f'{typed}<ssd:ConnectorGeometry x="{x}" y="{y:.3g}"/></ssd:Connector>\n'
-        )
-
-    # ---- Parameter sets and units ----------------------------------------------------------------
     def parameters(self, variant: str, component: str, values: Mapping[str, Value]) -> str:
         variables = [self.variable(component, name) for name in values]
-        rows = "".join(
-            f"    <ssv:Parameter name={quoteattr(variable.name)}>"
-            f"<ssv:{SETTABLE[variable.type][0]} value={quoteattr(_text(value))}"
-            f"{self.unit(variable)}/></ssv:Parameter>\n"
-            for variable, value in zip(variables, values.values(), strict=True)
-        )
+        rows = [
+            (x.name, SETTABLE[x.type][0], _text(value), self.unit(x))
+            for x, value in zip(variables, values.values(), strict=True)
+        ]
         said = self.system.descriptions.get(variant)
-        description = f" description={quoteattr(said)}" if said else ""
-        return f"""{HEAD}<ssv:ParameterSet version="1.0" name={quoteattr(variant)}{description}
-    {VALUES}
-    {COMMON}>
-  <ssv:Parameters>
-{rows}  </ssv:Parameters>
-{self.unit_list("ssv", variables)}</ssv:ParameterSet>
-"""
+        return parameter_set(variant, rows, said, self.used(variables))
 
     def variable(self, component: str, name: str) -> Variable:
         return self.variables[component][name]
 
     def unit(self, variable: Variable) -> str:
-        """Return the attribute for a unit that the FMUs define."""
+        """Return a unit that the FMUs define; else nothing."""
         known = variable.type == "Real" and variable.unit in self.units
-        return f" unit={quoteattr(str(variable.unit))}" if known else ""
+        return str(variable.unit) if known else ""
 
-    def unit_list(self, space: str, variables: Iterable[Variable]) -> str:
-        used = dict.fromkeys(v.unit for v in variables if self.unit(v) and v.unit is not None)
-        rows = "".join(
-            f"    <ssc:Unit name={quoteattr(unit)}><ssc:BaseUnit{_bases(self.units[unit])}/>"
-            "</ssc:Unit>\n"
-            for unit in sorted(used)
-        )
-        return f"  <{space}:Units>\n{rows}  </{space}:Units>\n" if rows else ""
+    def used(self, variables: Iterable[Variable]) -> list[tuple[str, dict[str, str]]]:
+        """Return the units of variables, each with what it is in SI base units."""
+        names = sorted({unit for variable in variables if (unit := self.unit(variable))})
+        return [(name, _bases(self.units[name])) for name in names]
 
 
-def _bases(unit: BaseUnit) -> str:
-    """Return the attributes of a unit in SI base units."""
+def parameter_set(
+    name: str,
+    rows: Iterable[tuple[str, str, str, str]],
+    description: str | None = None,
+    units: Iterable[tuple[str, dict[str, str]]] = (),
+) -> str:
+    """Write a parameter set of SSP 1.0; `rows`: name, type, value and unit of each parameter."""
+    given = {"rows": rows, "description": description, "units": units, "spaces": NAMESPACES}
+    return rendered("parameters.ssv", name=name, **given)
+
+
+def _bases(unit: BaseUnit) -> dict[str, str]:
+    """Return the exponents of SI base units, factor and offset that a unit has."""
     given = {name: getattr(unit, name) or 0 for name in BASES}
     given["factor"] = 0 if unit.factor in (None, 1) else unit.factor
-    return "".join(f' {name}="{_text(float(x))}"' for name, x in given.items() if x)
-
-
-def _connection(start: str, connector: str, component: str, name: str) -> str:
-    source = f"startElement={quoteattr(start)} " if start else ""  # else the system's own
-    return (
-        f"      <ssd:Connection {source}startConnector={quoteattr(connector)}\n"
-        f"          endElement={quoteattr(component)} endConnector={quoteattr(name)}/>\n"
-    )
+    return {name: _text(float(x)) for name, x in given.items() if x}
 
 
 def _set_file(component: str, variant: str) -> str:

@@ -143,7 +143,7 @@ def doubling_lines(doubling: list[Doubling]) -> list[str]:
 # ---- Picture -------------------------------------------------------------------------------------
 def figure(study: StepErrors, tracking: Sequence[Tracking], doubling: Sequence[Doubling]) -> Figure:
     """Errors over step and calls, energy, the delays' prediction, and the controlled steps."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(fname=STYLE):
         picture = Figure(figsize=(15, 8.6), layout="constrained")
         picture.get_layout_engine().set(w_pad=0.1, h_pad=0.08, hspace=0.04, wspace=0.04)
         axes = picture.subplots(2, 3)
