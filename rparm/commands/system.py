@@ -85,8 +85,6 @@ def _opened(path: Path, options: argparse.Namespace, stack: ExitStack) -> Sectio
     folder = project.systems().get(system.system.name)
     if folder and options.own and not project.is_built(path, folder):
         folder = None  # a user's file may have the name of a system of the project
-    if folder is None and options.pictures:
-        raise UserError(f"--pictures: {path} is no system of the project, which has pictures")
     console.messages(str(path), system.notes)
     return Section(folder, system)
 
@@ -170,13 +168,10 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
             with written(options.report):
                 over = options.others.get((SYSTEM, section.page(outcome.variant)))
                 entries.append(system_page.write_variant(options.report, section, outcome, over))
-            if options.pictures and section.study:
-                from rparm.report.pages import save_figure  # matplotlib takes long to import
-
+            if options.pictures:
                 with written(options.pictures):
                     options.pictures.mkdir(parents=True, exist_ok=True)
-                    figure = section.study.figure(section.ssp, outcome)
-                    save_figure(figure, options.pictures / f"{name}.png")
+                    system_page.write_picture(options.pictures / f"{name}.png", section, outcome)
             outcomes.append(outcome)
         print_differences(entries[-len(references) :])
     given = {"ssp": options.ssp, "step": options.step, "with": options.other}

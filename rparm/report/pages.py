@@ -27,6 +27,7 @@ UNPACK = "unpack.js"  # becomes PLOTLY
 INK, MUTED, GRID = "#22303c", "#6b7885", "#e3e8ec"
 REFERENCE_COLOR, RUN_COLOR = "#a9c5de", "#1d4e79"
 ERROR_COLORS = ("#d1793a", "#2f8f83", "#7a5195", "#8a8d3f")
+CURVE_COLORS = (RUN_COLOR, *ERROR_COLORS)
 DASHED = (0, (5, 3))
 STYLE = Path(__file__).with_name("figures.mplstyle")  # of matplotlib
 

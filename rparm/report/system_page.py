@@ -28,6 +28,7 @@ from rparm.units import duration, exponents, seconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
+COLUMNS = 2  # of a picture
 CURVES, DIAGRAMS = 6, 24  # most in a diagram, and on a page, of a system of a user
 
 
@@ -109,6 +110,34 @@ class Section:
         """The system and the version of FMI of its components."""
         versions = sorted({model.fmi_version for model in self.ssp.models.values()})
         return f"{self.shown} (FMI {' and '.join(versions)})"
+
+
+def write_picture(file: Path, section: Section, outcome: Outcome) -> None:
+    """Draw the diagrams of a variant's page into a picture, for READMEs."""
+    import matplotlib as mpl  # takes long
+    from matplotlib.figure import Figure
+
+    rows = -(-len(section.diagrams) // COLUMNS)
+    with mpl.rc_context(fname=pages.STYLE):
+        picture = Figure(figsize=(14, 2.2 * rows + 0.6), layout="constrained")
+        panels = picture.subplots(rows, COLUMNS, sharex=True, squeeze=False).ravel()
+        for axes, diagram in zip(panels, section.diagrams, strict=False):
+            plot = _plot(section.ssp, outcome, diagram)
+            axes.set_title(f"{plot.title} ({plot.unit})" if plot.unit else plot.title, loc="left")
+            for color, curve in zip(pages.CURVE_COLORS, plot.curves, strict=False):
+                if curve.reference is not None:
+                    wide = {"color": pages.REFERENCE_COLOR, "linewidth": 5, "label": "reference"}
+                    axes.plot(outcome.run.times, curve.reference, **wide)
+                style = "steps-post" if curve.steps else "default"
+                named = {"color": color, "label": curve.name, "drawstyle": style}
+                axes.plot(outcome.run.times, curve.values, linewidth=1.3, **named)
+            axes.legend(fontsize=8.5)
+            axes.set_xlabel("time (s)")
+        for axes in panels[len(section.diagrams) :]:
+            axes.remove()
+        found = ", ".join(f"{name} {text}" for name, text in _measures(section, outcome))
+        picture.suptitle(f"{section.shown}, {outcome.variant}: {found}", x=0.015, ha="left")
+    pages.save_figure(picture, file)
 
 
 def remove(report: Path, system: str, names: Sequence[str]) -> None:

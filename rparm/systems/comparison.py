@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from rparm.runs.comparison import Compared, Summed
 from rparm.systems import ecos
 from rparm.systems.master import Master
 from rparm.systems.structure import OpenedSystem
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 BOUND = 1e-7  # on the relative error of every variable
 
@@ -328,10 +325,6 @@ class Study(Protocol):
     EXPERIMENT: tuple[float, float, float]  # start, stop and step in s that the references are for
     MEASURES: Sequence[Measure]
     DIAGRAMS: Sequence[Diagram]  # of the page of a variant
-
-    def figure(self, ssp: OpenedSystem, outcome: Outcome) -> "Figure":
-        """Draw a run of one variant, for READMEs."""
-        ...
 
 
 class CouplingStudy(Study, Protocol):
