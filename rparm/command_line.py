@@ -3,6 +3,7 @@
 import argparse
 import re
 import shlex
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -12,7 +13,7 @@ from typing import Any, NoReturn
 
 from rparm import needs, project
 from rparm.errors import UserError, WrongValueError, did_you_mean
-from rparm.needs import COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, VERSION
+from rparm.needs import COMMANDS, COMMON, DEFAULT, EXIT_CODES, HELP, SHARED, VERSION
 from rparm.project import PROGRAM, VERSIONS
 
 SHORTEST = 1e-9  # s, of steps
@@ -83,13 +84,35 @@ def _help(names: Sequence[str]) -> str:
 
 
 def parser(command: str) -> argparse.ArgumentParser:
-    """Return the parser of a command's options."""
+    """Return the parser of a command's options, as commands.toml declares them."""
+    known, part = COMMANDS[command], COMMANDS[command].options.get("--output", {}).get("part", "")
+    words = {
+        "program": PROGRAM, "pages": f"{project.page('x')}"[:-1],
+        "report": project.from_root(project.report_folder(part)),
+        "campaigns": project.from_root(project.campaign_folder("NAME")),
+    }  # fmt: skip
+    about = " ".join(known.description.format(**words).split())
     # no abbreviations: --json is looked for before anything is parsed
-    made = _Parser(prog=f"{PROGRAM} {command}", epilog=EPILOG, allow_abbrev=False)
-    function(command, "add_{}_options")(made)
-    add_common(made)
-    if COMMANDS[command].builds:
-        add_flag(made, "--no-cache", "build models again, and keep nothing of them")
+    texts = {"description": about, "epilog": EPILOG}
+    made = _Parser(prog=f"{PROGRAM} {command}", allow_abbrev=False, **texts)
+    groups = defaultdict[str, argparse._ActionsContainer](made.add_mutually_exclusive_group)
+    groups[""] = made
+    options = {**known.options, **SHARED["common"], **(SHARED["builds"] if known.builds else {})}
+    for names, given in options.items():
+        if isinstance(given, str):
+            given = {"action": "store_true", "help": given}
+        own = SHARED["like"].get(given.get("like"), {}) | given
+        if "help" in own:
+            own["help"] = own["help"].format(**words) or argparse.SUPPRESS
+        group = groups[own.pop("group", "")]
+        if "part" in own:
+            own |= {"default": project.report_folder(own.pop("part"))}
+            hidden = {"dest": "report", "type": Path, "help": argparse.SUPPRESS}
+            made.add_argument("--report", default=own["default"], **hidden)  # its old name
+        if "type" in own:
+            own["type"] = TYPES[own["type"]]
+        own.pop("like", None)
+        group.add_argument(*names.split(), **own)
     return made
 
 
@@ -109,83 +132,6 @@ class _Parser(argparse.ArgumentParser):
             guess = did_you_mean(rest[0].partition("=")[0], self._option_string_actions)
             self.error(f"unrecognized arguments: {' '.join(rest)}{guess}")
         return options
-
-
-def add_flag(parser: argparse.ArgumentParser, option: str, text: str) -> None:
-    """Add an option without a value."""
-    parser.add_argument(option, action="store_true", help=text)
-
-
-def add_common(parser: argparse.ArgumentParser) -> None:
-    """Add the options of all commands."""
-    text = "print one JSON document on standard output, and all else on standard error"
-    add_flag(parser, "--json", text)
-    add_flag(parser, "--quiet", "print the last line only, and what is wrong")
-    add_flag(parser, "--open", "then show what was written in a browser")
-
-
-def add_system(
-    parser: argparse.ArgumentParser,
-    ssp: str = "the system (default: all)",
-    fmi: str = "systems with FMUs of this version of FMI (default: 2)",
-) -> None:
-    """Add the choice of a system: a file, or one of a version of FMI."""
-    choice = parser.add_mutually_exclusive_group()
-    choice.add_argument("--ssp", type=Path, metavar="PATH", help=ssp)
-    add_fmi(choice, VERSIONS[0], fmi)
-
-
-def add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) -> None:
-    """Add the choice of a version of FMI, one of `VERSIONS`."""
-    parser.add_argument("--fmi", type=_version, metavar="{2,3}", default=default, help=text)
-
-
-def add_tolerance(parser: argparse.ArgumentParser, text: str) -> None:
-    """Add the tolerance of the integrator."""
-    parser.add_argument("--tolerance", type=relative_tolerance, metavar="X", help=text)
-
-
-def add_step(parser: argparse.ArgumentParser) -> None:
-    """Add the communication step of a system, in place of the file's."""
-    text = "communication step, as 0.001 or 1ms (default: the system's)"
-    parser.add_argument("--step", type=positive_seconds, metavar="TIME", help=text)
-
-
-def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
-    """Add the folder for pages and results."""
-    folder = project.report_folder(part)
-    # its name until version 0.1
-    parser.add_argument("--report", type=Path, default=folder, help=argparse.SUPPRESS)
-    text = f"folder for pages and results (default: {project.from_root(folder)})"
-    _add_folder(parser, "report", text, folder)
-
-
-def add_other(parser: argparse.ArgumentParser) -> None:
-    """Add another result to draw over what is run."""
-    text = "draw over it: a CSV file with the column time, or a folder that has a result of each"
-    parser.add_argument("--with", dest="other", type=Path, metavar="PATH", help=text)
-
-
-def add_output(parser: argparse.ArgumentParser, text: str) -> None:
-    """Add the folder for other files than pages and results."""
-    _add_folder(parser, "output", text)
-
-
-def add_document(parser: argparse.ArgumentParser) -> None:
-    """Add the folder for the document, for a command that writes nothing else."""
-    _add_folder(parser, "document", "write what --json prints into this folder, too")
-
-
-def _add_folder(
-    parser: argparse.ArgumentParser, kind: str, text: str, default: Path | None = None
-) -> None:
-    parser.add_argument("--output", dest=kind, type=Path, metavar="DIR", default=default, help=text)
-
-
-def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> None:
-    """Add the longest time that something may be silent."""
-    text = f"{text} (default: {default:g} s)"
-    parser.add_argument("--silence", type=_silence, metavar="TIME", default=default, help=text)
 
 
 def number(text: str) -> int:
@@ -282,3 +228,10 @@ def _version(text: str) -> str:
         return version
     known = " or ".join(version[0] for version in VERSIONS)
     raise argparse.ArgumentTypeError(f"expected {known}, got {text!r}")
+
+
+TYPES = {
+    "path": Path, "number": number, "count": count, "seconds": seconds, "version": _version,
+    "positive_seconds": positive_seconds, "relative_tolerance": relative_tolerance,
+    "silence": _silence,
+}  # fmt: skip

@@ -7,9 +7,11 @@ So it imports the standard library only, and little of it.
 import os
 import stat
 import sys
-from collections.abc import Iterator, Sequence
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 
 class Command(NamedTuple):
@@ -21,58 +23,14 @@ class Command(NamedTuple):
     lock: str = ""  # requirements/LOCK.txt, which setup.sh installs beside run.txt
     target: str = "all"  # of CMake, that is built before; empty: nothing
     builds: bool = False  # models, if its files ask for it
+    description: str = ""  # for its help
+    options: Mapping[str, Any] = MappingProxyType({})
 
 
-COMMANDS = {
-    "run": Command(
-        "simulate scenarios, check them, write a report; the default", "run", builds=True
-    ),
-    "new": Command("write a scenario to start from", "files", target="", builds=True),
-    "build": Command("make FMUs of a file with equations", "equations", builds=True),
-    "new-model": Command("write a file with equations to start from", "equations", target=""),
-    "new-system": Command(
-        "write a file of a system to start from", "files", target="", builds=True
-    ),
-    "schema": Command("print a JSON Schema by which editors check files", "files", target=""),
-    "list": Command("name the scenarios", "files", target=""),
-    "system": Command(
-        "run systems in Ecos, check them, write a report", "system", "system", builds=True
-    ),
-    "coupling": Command(
-        "study how far co-simulation of a system is from its exact solution",
-        "coupling", "system", builds=True,
-    ),
-    "linearize": Command(
-        "find an equilibrium, a linear model, margins, the largest step",
-        "linearize", "control", "control", builds=True,
-    ),
-    "identify": Command(
-        "find parameters that fit logs of a machine",
-        "identify", "control", "control", builds=True,
-    ),
-    "campaign": Command(
-        "run a scenario or a system many times, over parameters",
-        "campaign", "campaign", "campaign", builds=True,
-    ),
-    "ssp": Command("write a system as an SSP, for other tools", "files", "system", builds=True),
-    "federation": Command(
-        "run a system with each FMU in its own process, coupled by HELICS",
-        "federation", "federation", "federation", builds=True,
-    ),
-    "federate": Command(
-        "step one component in a federation of another machine",
-        "federation", "federation", "federation", target="",
-    ),
-    "prove": Command("bound the errors of runs and references by theorem", "prove", builds=True),
-    "playground": Command(
-        "say where the page with the plant is, for a browser",
-        "files", lock="release", target="playground",
-    ),
-    "fmu": Command("copy an FMU, for another tool", "files"),
-    "completion": Command(
-        "print what makes a shell complete these commands", "completion", target=""
-    ),
-}  # fmt: skip
+with Path(__file__).with_name("commands.toml").open("rb") as file:
+    DECLARED = tomllib.load(file)
+SHARED = DECLARED.pop("shared")  # of the commands' options
+COMMANDS = {name: Command(**declared) for name, declared in DECLARED.items()}
 DEFAULT = "run"  # the command of names and options without one
 COMMON = ("--json", "--quiet")  # may stand in front of the command
 HELP = ("help", "--help", "-h")

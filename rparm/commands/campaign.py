@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rparm import console, project
-from rparm.command_line import Ended, add_flag, add_output, count, number, retyped
+from rparm.command_line import Ended, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, one_line
 from rparm.files import from_here, written
@@ -25,41 +25,6 @@ if TYPE_CHECKING:
     from rparm.campaign.work import Work
 
 NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
-
-
-def add_campaign_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Runs what is missing of a campaign, on a cluster of Dask, and writes tables and a "
-        "page. A campaign that was stopped resumes. Runs that fail are results; only that of "
-        "--replay is bad."
-    )
-    parser.add_argument(
-        "file", nargs="?", metavar="FILE.toml", help="the campaign, or the name of one of --list"
-    )
-    add_flag(parser, "--list", "name the project's campaigns, run nothing")
-    parser.add_argument(
-        "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"
-    )
-    folder = project.from_root(project.campaign_folder("NAME"))
-    add_output(parser, f"folder for the results (default: that in the file, or {folder})")
-    text = "run only run N again; writes all its Real outputs and a page"
-    parser.add_argument("--replay", type=number, metavar="N", help=text)
-    where = parser.add_mutually_exclusive_group()
-    text = (
-        "a scheduler that runs elsewhere, as tls://192.168.0.1:8786; with tcp://, whoever reaches "
-        "it or its workers runs code there"
-    )
-    where.add_argument("--scheduler", metavar="ADDRESS", help=text)
-    text = "processes on this machine (default: one per core)"
-    where.add_argument("--workers", type=count, metavar="N", help=text)
-    for name, text in (
-        ("ca", "certificate of the authority that signs those of scheduler, workers and client"),
-        ("cert", "certificate of the client"),
-        ("key", "its private key"),
-    ):
-        parser.add_argument(f"--tls-{name}", type=Path, metavar="PEM", help=f"for tls://: {text}")
-    text = "no pages of Dask on this machine, which all its users can read"
-    add_flag(parser, "--no-dashboard", text)
 
 
 def do_campaign(options: argparse.Namespace) -> Ended:

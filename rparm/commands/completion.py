@@ -8,23 +8,13 @@ from typing import Any
 import shtab
 
 from rparm import command_line, project
-from rparm.command_line import COMMANDS, Ended, add_output
+from rparm.command_line import COMMANDS, Ended
 from rparm.files import write_text, written
 from rparm.systems import comparison
 
 SCRIPT = Path(project.PROGRAM).name
 # names of files that the shells look for
 SHELLS = {"bash": SCRIPT, "zsh": f"_{SCRIPT}", "tcsh": f"{SCRIPT}.tcsh"}
-
-
-def add_completion_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Prints a script that makes a shell complete commands, options, scenarios and files. "
-        f'In bash: eval "$({project.PROGRAM} completion bash)". In zsh the same with zsh, after '
-        "compinit. In tcsh: save it, then source the file."
-    )
-    parser.add_argument("shell", choices=list(SHELLS), help="the shell that reads the script")
-    add_output(parser, "write the script into this folder, by the name that the shell looks for")
 
 
 def do_completion(options: argparse.Namespace) -> Ended:

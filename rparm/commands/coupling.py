@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_report, add_step, add_system, file_or_name, retyped
+from rparm.command_line import Ended, file_or_name, retyped
 from rparm.console import Progress
 from rparm.errors import UserError
 from rparm.files import check_writable, from_folder, written
@@ -30,21 +30,6 @@ ERRORS = (
     "by which runs at three steps approach each other; the tolerance of the FMUs' integrators and "
     "events end it."
 )
-
-
-def add_coupling_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Runs a system at its communication step and at halves of it, in all orders, with inputs "
-        "held and extrapolated, as far as its FMUs can: errors, their orders, largest stable "
-        "steps. Without a file, studies the project's closed loop in depth."
-    )
-    text = "a loop file, an SSP, or a name of the project"
-    parser.add_argument("what", nargs="?", metavar="FILE|NAME", help=text)
-    text = "parameter set (default: 'default' if there is one, else the first)"
-    parser.add_argument("variant", nargs="?", metavar="VARIANT", help=text)
-    add_step(parser)
-    add_system(parser)
-    add_report(parser, PART)
 
 
 def do_coupling(options: argparse.Namespace) -> Ended:

@@ -7,12 +7,11 @@ from pathlib import Path
 
 from rparm import project
 from rparm.building import NEEDED, build
-from rparm.command_line import Ended, add_flag, add_output
+from rparm.command_line import Ended
 from rparm.errors import UserError
 from rparm.files import NAME, check_for_windows, create, written
 
 SUFFIX = ".toml"
-MODELS_PAGE = "examples/models/README.md"
 
 
 def own_file(options: argparse.Namespace, kind: str) -> Path:
@@ -22,15 +21,6 @@ def own_file(options: argparse.Namespace, kind: str) -> Path:
         raise UserError(f"{wrong}: a letter, then letters, digits, _")
     check_for_windows(options.name)
     return (options.output or Path()) / f"{options.name}{SUFFIX}"
-
-
-def add_new_model_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "
-        "makes FMUs of it. Beside it model.schema.json lets editors complete and check such files."
-    )
-    parser.add_argument("name", metavar="NAME", help="of the FMU: letters, digits and _")
-    add_output(parser, "folder for the file (default: the current one)")
 
 
 def do_new_model(options: argparse.Namespace) -> Ended:
@@ -49,18 +39,6 @@ def do_new_model(options: argparse.Namespace) -> Ended:
         create(of_schema, text)
     verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"
     return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())
-
-
-def add_build_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and "
-        f"fmi3/NAME.fmu. {project.page(MODELS_PAGE)} explains the file. Beside it FILE.lock.toml "
-        "keeps the value references."
-    )
-    parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
-    add_flag(parser, "--platforms", "for all platforms, by zig, not for this machine")
-    add_flag(parser, "--web", "as WebAssembly, by zig, to drop on the playground")
-    add_output(parser, "folder for the FMUs (default: the current one)")
 
 
 def do_build(options: argparse.Namespace) -> Ended:

@@ -5,20 +5,18 @@ import math
 import os
 import shlex
 import time
-from pathlib import Path
 
 import numpy as np
 
 from rparm import console, files, project
-from rparm.command_line import Ended, add_document, add_fmi, add_output, add_silence, add_system
+from rparm.command_line import Ended
 from rparm.console import Progress
 from rparm.errors import UserError, counted, hint
-from rparm.federation import SILENCE, component, federation, network
+from rparm.federation import component, federation, network
 from rparm.federation.component import parts, real_connections
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
 from rparm.files import check_writable, from_here, written
-from rparm.project import VERSIONS
 from rparm.result_tables import FederationTable
 from rparm.systems import comparison, ecos
 from rparm.systems.master import Master
@@ -26,36 +24,6 @@ from rparm.systems.opened import given_file, opened
 from rparm.systems.structure import OpenedSystem
 
 BOUND = 1e-12  # on the largest difference to the master, relative to the variable's largest value
-
-
-def add_federation_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Runs variants of the closed loop, or of the system in a file, with each component in its "
-        "own process, coupled by HELICS, and compares every value with that of the master that "
-        "steps all in one process in Jacobi order. The processes may be on several machines."
-    )
-    text = "a loop file or an SSP first; variants (default: all)"
-    parser.add_argument("names", nargs="*", metavar="NAME", help=text)
-    add_system(
-        parser,
-        "the system (default: the closed loop)",
-        "the system with FMUs of this version of FMI",
-    )
-    parser.add_argument(
-        "--listen",
-        metavar="ADDRESS",
-        help="where processes of other machines find the federation, as tcp://192.168.0.1:23404 "
-        "(default: a free port that only this machine sees)",
-    )
-    parser.add_argument(
-        "--elsewhere",
-        nargs="+",
-        default=[],
-        metavar="COMPONENT",
-        help="components that are not started here, in one variant: prints the command for each",
-    )
-    add_silence(parser, SILENCE, "processes that do not answer for so long end the federation")
-    add_output(parser, "write what was recorded of each variant into this folder, VARIANT.csv")
 
 
 def do_federation(options: argparse.Namespace) -> Ended:
@@ -149,22 +117,6 @@ def _master(system: OpenedSystem, variant: str, record: Record) -> tuple[float, 
     expected = rows[:, columns]
     scale = np.maximum(np.abs(expected).max(axis=0), np.finfo(float).tiny)
     return float((np.abs(record.values - expected) / scale).max()), seconds
-
-
-def add_federate_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Steps one component of a system until the federation has come to the end."
-    parser.add_argument("ssp", type=Path, metavar="FILE", help="the system: a loop file or an SSP")
-    parser.add_argument("variant", metavar="VARIANT")
-    parser.add_argument("component", metavar="COMPONENT")
-    add_fmi(parser, VERSIONS[0], "version of FMI of the project's and of built FMUs (default: 2)")
-    parser.add_argument(
-        "--broker", required=True, metavar="ADDRESS", help="of the federation, as --listen there"
-    )
-    text = "most that a call of the FMU may take, or the broker be silent"
-    add_silence(parser, SILENCE, text)
-    add_document(parser)
-    # for processes that a federation starts: they end with their standard input
-    parser.add_argument("--owned", action="store_true", help=argparse.SUPPRESS)
 
 
 def do_federate(options: argparse.Namespace) -> Ended:

@@ -13,30 +13,19 @@ from zipfile import ZipFile
 
 from rparm import console, project, schemas
 from rparm.building import EQUATIONS
-from rparm.command_line import Ended, add_document, add_fmi, add_output
+from rparm.command_line import Ended
 from rparm.commands.equations import SUFFIX, own_file
 from rparm.errors import UserError, closest, placed
 from rparm.files import NAME, check_for_windows, copied, create, from_folder, read_toml, written
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.interruption import temporary_folder
-from rparm.project import START, VERSIONS
+from rparm.project import START
 from rparm.runs import scenario
 from rparm.systems.structure import times
 from rparm.units import NONE
 
 TOOLS = project.page("docs/use-in-your-tool.md")
 TUTORIAL = "docs/tutorial.md"
-
-
-def add_new_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        f"Writes NAME.toml, a scenario with comments that runs as it is: {project.PROGRAM} "
-        "NAME.toml."
-    )
-    parser.add_argument("name", metavar="NAME", help="name of the scenario, or path of its file")
-    text = "what to simulate, or a file .fmu (default: the model with the most scenarios)"
-    parser.add_argument("--model", metavar="MODEL", help=text)
-    add_output(parser, "folder for the file (default: this one, or that of the path)")
 
 
 def do_new(options: argparse.Namespace) -> Ended:
@@ -96,18 +85,6 @@ def _usual_model() -> Path:
     if not folders:
         raise UserError(f"{project.models_folder()}: has no scenarios")
     return max(folders, key=lambda folder: len(list(folder.glob("scenarios/*.toml"))))
-
-
-def add_new_system_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Writes NAME.toml, a system of FMUs that runs as it is. Connections that names and units "
-        f"suggest are comments in it. Run it by {project.PROGRAM} system NAME.toml; "
-        f"{project.page(TUTORIAL)} begins from equations and a controller in Python."
-    )
-    parser.add_argument("name", metavar="NAME", help="of the system: letters, digits and _")
-    text = "files .fmu, or names of the project's; one may come several times"
-    parser.add_argument("fmus", nargs="+", metavar="FMU", help=text)
-    add_output(parser, "folder for the file (default: the current one)")
 
 
 def do_new_system(options: argparse.Namespace) -> Ended:
@@ -190,35 +167,12 @@ def _feeding(
     return same or [name for name, own in alike.items() if own == similar][:1]
 
 
-def add_schema_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Prints the JSON Schema of files with equations, or of others. An editor that knows TOML "
-        "(VS Code with Even Better TOML) completes and checks a file whose first line is "
-        "#:schema ./model.schema.json, as new-model writes it."
-    )
-    kinds = {"nargs": "?", "choices": list(schemas.KINDS), "default": "model"}
-    parser.add_argument("kind", **kinds, help="of what files (default: model)")
-    add_output(parser, "write KIND.schema.json into this folder, in place of an older one")
-
-
 def do_schema(options: argparse.Namespace) -> Ended:
     text = schemas.text(options.kind)
     if options.output is None:
         return Ended(0, text.rstrip(), {"schema": json.loads(text)})
     file = schemas.write(options.output / f"{options.kind}.schema.json", text)
     return Ended(0, f"{file}: written", {"file": file.absolute()}, page=file)
-
-
-def add_ssp_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Writes NAME.ssp, SSP 1.0 of the system NAME in FILE.toml: its FMUs, connections and "
-        "variants. Inputs that move become inputs of the system. Components in Python are packed "
-        "as FMUs by pythonfmu."
-    )
-    parser.add_argument("file", metavar="FILE.toml", type=Path, help="the system")
-    add_fmi(parser, VERSIONS[0], "version of FMI of the project's and of built FMUs (default: 2)")
-    text = "folder for the file (default: the current one), or the file .ssp"
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR|FILE", default=Path(), help=text)
 
 
 def do_ssp(options: argparse.Namespace) -> Ended:
@@ -244,24 +198,12 @@ def do_ssp(options: argparse.Namespace) -> Ended:
     return Ended(0, verdict, document, page=path)
 
 
-def add_fmu_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Copies the FMU of a model, for another tool."
-    parser.add_argument("name", metavar="NAME", help="name of the FMU, or of its model")
-    add_fmi(parser, VERSIONS[0], "its version of FMI (default: 2)")
-    add_output(parser, "copy it into this folder (default: the current one)")
-
-
 def do_fmu(options: argparse.Namespace) -> Ended:
     """Copy the FMU; a file that has its name is replaced."""
     file = project.built(project.model(options.name), ".fmu", version=options.fmi)
     path = copied(file, (options.output or Path()) / file.name)
     verdict = f"{path}: FMI {options.fmi}, {path.stat().st_size} bytes; to import it: {TOOLS}"
     return Ended(0, verdict, {"file": path.absolute(), "fmi_version": options.fmi})
-
-
-def add_list_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Prints the name and the title of every scenario."
-    add_document(parser)
 
 
 def do_list(_: argparse.Namespace) -> Ended:
@@ -271,11 +213,6 @@ def do_list(_: argparse.Namespace) -> Ended:
         for name, path in files.items()
     ]
     return Ended(0, console.titles(found), {"scenarios": found})
-
-
-def add_playground_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Says where the page with the plant is; --open shows it."
-    add_output(parser, "copy the page into this folder")
 
 
 def do_playground(options: argparse.Namespace) -> Ended:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rparm import console, project
 from rparm.building import EQUATIONS
-from rparm.command_line import Ended, add_flag, add_report, file_or_name, names, pairs, retyped
+from rparm.command_line import Ended, file_or_name, names, pairs, retyped
 from rparm.errors import UserError, placed
 from rparm.files import check_writable, from_here, number_in, written
 from rparm.report import overview, pages
@@ -26,40 +26,6 @@ SEGMENT = "0.4"  # s
 SUFFIXES = (".fmu", EQUATIONS)
 SEVERAL = "parameters", "inputs", "measured", "set", "start", "columns", "units"
 GIVEN = *SEVERAL, "delay", "validate"
-
-
-def add_identify_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Fits parameters of an FMU to logs of a machine, and says how well they are known: a "
-        "table, a page, and the result as a scenario and as parameter files."
-    )
-    parser.add_argument(
-        "fmu",
-        nargs="?",
-        metavar="FMU",
-        help="a file, also with equations, or a model of the project",
-    )
-    parser.add_argument(
-        "logs", nargs="*", type=Path, metavar="LOG.csv", help="with a column of times in s"
-    )
-
-    def several(option: str, name: str, text: str) -> None:
-        parser.add_argument(option, nargs="+", action="extend", default=[], metavar=name, help=text)
-
-    several("--parameters", "NAME", "to be estimated; 'NAME>OTHER': stays above OTHER")
-    several("--inputs", "NAME", "inputs that the logs have, each held over the step from its row")
-    several("--measured", "NAME", "outputs that the logs have")
-    several("--set", "NAME=VALUE", "other parameters, where they differ from the FMU's")
-    several("--start", "NAME=VALUE", "where the fit begins; of states that are not measured, too")
-    several("--columns", "NAME=COLUMN", "columns whose name is another one; time=COLUMN, too")
-    several("--units", "NAME=UNIT", "units of columns that have other ones, as deg or mm")
-    add_flag(parser, "--delay", "estimate by how much measured values are late, too")
-    text = "run this log with the result"
-    parser.add_argument("--validate", type=Path, metavar="LOG.csv", help=text)
-    text = f"length of a segment (default: {SEGMENT} s)"
-    parser.add_argument("--segment", metavar="TIME", default=SEGMENT, help=text)
-    add_flag(parser, "--demo", "make a log from a system of the project, and use it")
-    add_report(parser, PART)
 
 
 def do_identify(options: argparse.Namespace) -> Ended:

@@ -1,19 +1,14 @@
 """`linearize`: the linear model of an FMU or a system at a point."""
 
 import argparse
-from pathlib import Path
 
 from rparm import console, project
 from rparm.command_line import (
     Ended,
-    add_fmi,
-    add_report,
     file_or_name,
     names,
     pairs,
-    positive_seconds,
     retyped,
-    seconds,
 )
 from rparm.errors import UserError
 from rparm.files import check_writable, from_here, written
@@ -23,43 +18,6 @@ from rparm.report.overview import RAN, Entry, crosses
 PART = overview.LINEAR
 MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
 SUFFIXES = (".fmu", ".ssp", ".toml")
-
-
-def add_linearize_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a "
-        "loop that is broken, and the largest stable communication step."
-    )
-    text = "an FMU, a loop file, an SSP, or a name of the project"
-    parser.add_argument("what", metavar="FILE|NAME", help=text)
-    text = "parameter set of a system, as --variant"
-    parser.add_argument("given_variant", nargs="?", default="", metavar="VARIANT", help=text)
-    add_fmi(parser, project.VERSIONS[0], "version of FMI where a name is given (default: 2)")
-    parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")
-    parser.add_argument(
-        "--at", nargs="+", default=[], metavar="NAME=VALUE", action="extend",
-        help="states, inputs and parameters, with units as in 30deg; with --trim also outputs, and "
-        "first guesses of what it moves",
-    )  # fmt: skip
-    parser.add_argument("--time", type=seconds, help="time of the point (default: the start)")
-    for option, text in (
-        ("--trim", "states and inputs to move until the point is an equilibrium"),
-        ("--inputs", "inputs of the model (default: all)"),
-        ("--outputs", "outputs of the model (default: all)"),
-        ("--without", "components of a system to take as ideal, as sampled sensors"),
-    ):
-        parser.add_argument(option, nargs="+", metavar="NAME", help=text)
-    parser.add_argument(
-        "--break", dest="cut", default="", metavar="COMPONENT.INPUT",
-        help="break the loop at this input, and find its margins",
-    )  # fmt: skip
-    parser.add_argument(
-        "--step", type=positive_seconds, metavar="TIME", help="sample the model, too, inputs held"
-    )
-    parser.add_argument(
-        "--save", nargs="+", default=[], type=Path, metavar="FILE", help=".json, .mat or .csv"
-    )
-    add_report(parser, PART)
 
 
 def do_linearize(options: argparse.Namespace) -> Ended:

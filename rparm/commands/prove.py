@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm import building, console, project
-from rparm.command_line import Ended, add_flag, add_report, add_tolerance, retyped
+from rparm.command_line import Ended, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, WrongValueError, counted, placed
 from rparm.files import check_writable, written
@@ -17,7 +17,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.interruption import temporary_folder
 from rparm.proof import enclosure as enclosures
 from rparm.proof import errors as proof
-from rparm.proof.enclosure import ASSUMED, Enclosure, Prover
+from rparm.proof.enclosure import Enclosure, Prover
 from rparm.proof.errors import ProvenReference
 from rparm.report import proof_page
 from rparm.runs import scenario as scenarios
@@ -25,26 +25,6 @@ from rparm.runs.scenario import Scenario
 from rparm.units import rounded_up, short, typed_quantity, verdict
 
 COLUMNS = {"values": 8, "nearest doubles": 8, "interval": 9}
-
-
-def add_prove_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Encloses the exact motion of a scenario in intervals, by validated integration, and "
-        "prints how far the states in a run of the FMU are from it at most, for each method of "
-        "integration, up to the first event. A model of equations runs as its file says. Every "
-        "value of a scenario's reference must be the double nearest to the exact one. Without a "
-        f"scenario, checks all references. Assumed are {ASSUMED}."
-    )
-    text = "a scenario, or a file FILE.toml of your own: a scenario or a model of equations"
-    parser.add_argument("name", nargs="?", metavar="SCENARIO", help=text)
-    add_flag(parser, "--all", "all references, as without a scenario")
-    parser.add_argument("--method", metavar="NAME", help="only this method of integration")
-    add_tolerance(parser, "relative tolerance of the runs (default: that of the scenario)")
-    text = "by how much the start may be off: with a unit (0.1deg), the states of that unit"
-    parser.add_argument("--within", metavar="VALUE", help=text)
-    text = "check every step of the proof by a second program, in other arithmetic"
-    add_flag(parser, "--check", text)
-    add_report(parser)
 
 
 def do_prove(options: argparse.Namespace) -> Ended:

@@ -9,11 +9,6 @@ from pathlib import Path
 from rparm import console, project, result_tables
 from rparm.command_line import (
     Ended,
-    add_flag,
-    add_fmi,
-    add_other,
-    add_report,
-    add_tolerance,
     retyped,
 )
 from rparm.commands.files import do_list
@@ -37,24 +32,6 @@ from rparm.units import short
 SUFFIX = ".toml"
 FIRST, TWIN = VERSIONS  # of FMI: the one that runs, and the one that has to give the same bits
 QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
-
-
-def add_run_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances "
-        "1e-4 to 1e-11; compares all outputs with the reference, and prints the largest "
-        "errors. Without names, measures the order of convergence in the communication step "
-        "too. The FMUs are of FMI 2.0; those of FMI 3.0 must give the same bits."
-    )
-    text = "scenarios, or files FILE.toml of your own (default: all scenarios)"
-    parser.add_argument("names", nargs="*", metavar="NAME", help=text)
-    add_flag(parser, "--list", "name the scenarios, run nothing")
-    text = "the FMU, for the scenarios of its model (default: that of each model)"
-    parser.add_argument("--fmu", type=Path, metavar="PATH", help=text)
-    add_fmi(parser, None, "run only FMUs of this version of FMI")
-    add_report(parser)
-    add_other(parser)
-    add_tolerance(parser, "run at this relative tolerance only, without the sweep")
 
 
 def do_run(options: argparse.Namespace) -> Ended:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rparm import console, project
-from rparm.command_line import Ended, add_flag, add_other, add_report, add_step, add_system, retyped
+from rparm.command_line import Ended, retyped
 from rparm.console import Progress
 from rparm.errors import UserError, counted, did_you_mean, together
 from rparm.files import check_writable, written
@@ -19,23 +19,6 @@ from rparm.result_tables import VariantTable, print_differences
 from rparm.systems import comparison, ecos, master
 from rparm.systems.comparison import Outcome, Reference
 from rparm.systems.opened import given_file, opened
-
-
-def add_system_options(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Runs the variants of the systems in Ecos and compares every variable with the reference. "
-        "A system of your own, loop.toml or an SSP, has no reference: half the step shows how much "
-        "the coupling costs."
-    )
-    add_system(parser)
-    text = "a file FILE.toml or FILE.ssp first; variants, or systems with all theirs (default: all)"
-    parser.add_argument("names", nargs="*", metavar="NAME", help=text)
-    add_step(parser)
-    add_report(parser)
-    add_other(parser)
-    text = "draw each variant into a picture in this folder, too"
-    parser.add_argument("--pictures", type=Path, metavar="DIR", help=text)
-    add_flag(parser, "--list", "name the systems and their variants")
 
 
 def do_system(options: argparse.Namespace) -> Ended:

@@ -1,6 +1,5 @@
 """What commands print, and what all of them have: --json, --quiet, --output, --open, completion."""
 
-import argparse
 import json
 import math
 import random
@@ -205,10 +204,8 @@ def test_the_playground_is_where_it_is_said_to_be(
 def test_the_folder_for_results_has_two_names(capsys: pytest.CaptureFixture[str]) -> None:
     """--report is what --output was called: it works, and no help shows it."""
     for name in ("run", "system"):
-        add_options = command_line.function(name, "add_{}_options")
+        parser = command_line.parser(name)
         for option in ("--output", "--report"):
-            parser = argparse.ArgumentParser()
-            add_options(parser)
             assert parser.parse_args([option, "here"]).report == Path("here")
         assert parser.parse_args([]).report == project_folders.report_folder()
         assert "--output DIR" in parser.format_help() and "--report" not in parser.format_help()

@@ -46,7 +46,8 @@ def root(tmp_path: Path) -> Path:
     shutil.copytree(ROOT / scenarios, root / scenarios)
     shutil.copy(ROOT / "run.sh", root)
     (root / "rparm").mkdir()
-    shutil.copy(ROOT / "rparm" / "needs.py", root / "rparm")
+    for name in ("needs.py", "commands.toml"):
+        shutil.copy(ROOT / "rparm" / name, root / "rparm")
     for name, text in {
         "setup.sh": SETUP,
         "bin/cmake": CMAKE,
