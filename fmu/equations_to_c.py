@@ -11,7 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from compiler.read.header import SUFFIX, Header
+from compiler.names import OF_VALUES
+from compiler.read.header import Header
 from compiler.read.include import source_of
 from compiler.read.model_file import ModelFileError, read
 from compiler.write import c_events, declaration, lock
@@ -69,7 +70,7 @@ def main() -> None:
 def _header(path: Path) -> tuple[dict[str, str], list[Path]]:
     """Return the header of a file, by its name, and what was read."""
     source = source_of(path)
-    return {f"{path.stem}{SUFFIX}": Header(source).text()}, [s.path for s in source.all()]
+    return {f"{path.stem}{OF_VALUES}": Header(source).text()}, [s.path for s in source.all()]
 
 
 def _model(path: Path) -> tuple[dict[str, str], list[Path]]:

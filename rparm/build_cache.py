@@ -22,10 +22,10 @@ from typing import Any
 
 from rparm import fmu_tools, project
 from rparm.files import whole
+from rparm.fmu_tools.compiler.names import OF_VALUES
 
 LARGEST = 2**30  # bytes of all entries
 LARGEST_NAMED = 10**7  # bytes of a file that a model names: a larger one is refused
-OF_VALUES = "_values.h"  # how headers end that are made of files with equations
 COMPILERS = ("gcc", "clang", "zig", "as", "ld")
 # variables that lead compilers to other files, or change what they write
 VARIABLES = ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX")

@@ -5,7 +5,7 @@ A folder or module imports only from lines above its own:
     units         symbols of units, and what numbers with them are in SI
     expressions   what users write, and its dimensions
     graph         operations on values and conditions, and their derivatives; tables
-    names         names in C of the variables of a file
+    names         names in C that follow from a file and its variables
     plain_c       interprets functions in plain C, as values of a graph
     read          a file with equations, checked, and its graph
     write         C, declaration, page and lock file of a model

@@ -1,10 +1,12 @@
-"""Names in C of the variables of a file."""
+"""Names in C that follow from a file and its variables."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
 from itertools import groupby
+
+OF_VALUES = "_values.h"  # behind the stem of a file: the header that is made of it
 
 
 def c_name(prefix: str, name: str) -> str:

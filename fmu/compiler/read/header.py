@@ -15,11 +15,11 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from ..names import OF_VALUES
 from .arrays import elements
 from .content import BOOLEAN, INTEGER, ModelFile
 from .include import Source, source_of
 
-SUFFIX = "_values.h"
 GROUPS = {"inputs": "inputs", "states": "states", "discrete": "held between events"}
 CALCULATED = ("where", "outputs")  # those without a value are written by C
 Place = tuple[str | int, ...]  # a field of struct NAME_values, from its name
@@ -136,7 +136,7 @@ class Header:
         """The text of the header."""
         lines = [f"/* Made of {self.stem}.toml: change that file. */", "#pragma once", ""]
         folders = [Path(os.path.relpath(header.folder, self.folder)) for header in self.inner]
-        paths = [f / (h.stem + SUFFIX) for f, h in zip(folders, self.inner, strict=True)]
+        paths = [f / (h.stem + OF_VALUES) for f, h in zip(folders, self.inner, strict=True)]
         lines += [f'#include "{path.as_posix()}"' for path in paths]
         for field in (*self.own, *(f for fields in self.variables.values() for f in fields)):
             lines += [*field.enum()]
@@ -168,8 +168,8 @@ def _struct(name: str, fields: Iterable[str]) -> list[str]:
 
 def origin(path: Path) -> Path:
     """Return NAME.toml in place of a file NAME_values.h that is not there."""
-    is_made = path.name.endswith(SUFFIX) and not path.is_file()
-    return path.with_name(path.name.removesuffix(SUFFIX) + ".toml") if is_made else path
+    is_made = path.name.endswith(OF_VALUES) and not path.is_file()
+    return path.with_name(path.name.removesuffix(OF_VALUES) + ".toml") if is_made else path
 
 
 def made(path: Path) -> str | None:
