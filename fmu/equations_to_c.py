@@ -1,8 +1,6 @@
 """Writes the C of a file with equations and the variables.toml of its FMU, for the project's build.
 
-Value references are those of its lock file, which has to have all: `rparm build` writes it. An
-entry of [where] or a number about a sampler that the lock file does not name is no variable of the
-FMU.
+Value references are those of its lock file, which has to have all: `rparm build` writes it.
 """
 
 import argparse
@@ -15,7 +13,7 @@ from compiler.names import OF_VALUES
 from compiler.read.header import Header
 from compiler.read.include import source_of
 from compiler.read.model_file import ModelFileError, read
-from compiler.write import c_events, declaration, lock
+from compiler.write import declaration, lock
 from generate import write_if_changed
 from program import program
 from source_code import dependencies
@@ -78,10 +76,8 @@ def _model(path: Path) -> tuple[dict[str, str], list[Path]]:
     file = read(path, declaration.solver_names())
     lock_file = lock.path_of(path)
     references = lock.references(lock_file, [])
-    hidden = {variable.name for variable in file.of("where")}
-    hidden |= {tick.name for tick in c_events.ticks(file)}
     for name, kind in declaration.keys(file):
-        if (name, kind) not in references and name not in hidden:
+        if (name, kind) not in references:
             raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")
     texts = declaration.generated(file)
     texts["variables.toml"] = toml(declaration.declared(file, references))

@@ -84,7 +84,7 @@ function(add_values_header target file)
   cmake_path(ABSOLUTE_PATH file)
   cmake_path(GET file STEM name)
   set(output ${CMAKE_CURRENT_BINARY_DIR}/${name}_values.h)
-  file(GLOB_RECURSE generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/read/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/*.py ${FMU_SOURCE_DIR}/compiler/read/*.py)
   add_custom_command(
     OUTPUT ${output}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} --header

@@ -116,8 +116,8 @@ static const struct subject subjects[SUBJECTS] = {
       {PLACE(rp_plant_values, inputs), PLACE(rp_plant_values, ddq)}},
      {{PLACE(rp_plant_values, ddq), PLACE(rp_plant_values, payload_attached)},
       {PLACE(rp_plant_values, ee_position), END(rp_plant_values)}}, .place = place_plant},
-    [WALL] = {&equations_model, {{0, PLACE(equations_values, v_n_x)}},
-     {{PLACE(equations_values, v_n_x), END(equations_values)}}, .place = place_wall},
+    [WALL] = {&equations_model, {{0, PLACE(equations_values, v_ee_fx)}},
+     {{PLACE(equations_values, v_ee_fx), END(equations_values)}}, .place = place_wall},
 };
 // clang-format on
 

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.equations.compiled import building, declaration, lock, read
 from tests.models.published_interface import PLACES, differences, of_fmu, of_texts, published
-from tests.support.paths import EVERY
+from tests.support.paths import EVERY, OF_FILES, ROOT
 
 # What may differ, and why: FMU, variable or path of another part, column; "*" is any
 EVENTS = "where a limit begins and ends is an event now"
@@ -62,6 +63,19 @@ def test_the_published_interface_stays(fmu: Path, name: str) -> None:
     assert not wrong, "\n".join(wrong)
     own = [entry for entry in CHANGED if entry[0] == name]
     assert [entry for entry in own if not any(allows(entry, key) for key, _ in found)] == []
+
+
+@pytest.mark.parametrize("name", OF_FILES)
+def test_rparm_build_gives_what_the_project_ships(fmu: Path, name: str, tmp_path: Path) -> None:
+    """The same C and the same model description, up to the author and the license."""
+    file = read(ROOT / OF_FILES[name], declaration.solver_names())
+    references = lock.references(lock.path_of(file.path), declaration.keys(file))
+    declared = building.write_c(file, references, tmp_path)
+    description = building.fmi2_description(declared, building.Provenance())
+    assert list(differences(of_fmu(fmu.with_name(f"{name}.fmu")), of_texts(description))) == []
+    shipped = fmu.parent / "fmu" / name
+    for path in ("model/equations.c", "model/equations.h", "variables.c"):
+        assert (tmp_path / Path(path).name).read_bytes() == (shipped / path).read_bytes(), path
 
 
 DESCRIPTION = """<fmiModelDescription fmiVersion="{version}.0" modelName="M" guid="{{1}}">

@@ -17,6 +17,7 @@ _DECLARED = _FMU.findall(_TEXT)
 NAMES = tuple(name for name, _, _ in _DECLARED)
 EXAMPLES = dict(re.findall(r"^  add_fmu\((\w+) EQUATIONS (\S+)\)", _TEXT, re.M))  # their files
 EVERY = (*NAMES, *EXAMPLES)
+OF_FILES = dict(re.findall(r"^ *add_fmu\((\w+) (?:FOLDER \S+ )?EQUATIONS (\S+?)\)?$", _TEXT, re.M))
 FOLDERS = {name: folder for name, folder, _ in _DECLARED}  # below models/
 CARRIED = {name: scenarios.split() for name, _, scenarios in _DECLARED if scenarios}
 SYSTEMS = tuple(re.findall(r"^add_ssp\((\w+)", _TEXT, re.MULTILINE))

@@ -123,7 +123,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     }
     includes = [TIME, *([EVENTS] if relations or file.sampled else [])]
     includes += [SOLVER] if states else [TIME_EVENTS] if file.sampled else []
-    helpers = {variable.name for variable in file.of("where")}  # last, if shown at all
+    helpers = {variable.name for variable in file.of("where")}  # last
     return {
         "include": [str(path) for path in includes],
         "model": model,
@@ -132,7 +132,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "variables": {
             name: {"reference": references[name, kind], **tables[name]}
             for name, kind in sorted(keys(file), key=lambda key: key[0] in helpers)
-            if name in tables and (name, kind) in references
+            if name in tables
         },
         "terminals": {
             name: terminal.model_dump(exclude_defaults=True)
