@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
-from .expressions.expression import LONGEST
+from .expressions.parser import LONGEST
 from .graph.tables import INTERPOLATIONS, OUTSIDE
 from .read import keys as reader
 from .read.arrays import FOR

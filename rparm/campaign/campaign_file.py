@@ -24,7 +24,7 @@ from pydantic import (
 from rparm import project
 from rparm.errors import UserError, WrongValueError, hint
 from rparm.files import read_toml, show
-from rparm.fmu_tools.compiler.expressions.expression import Expression, parsed
+from rparm.fmu_tools.compiler.expressions.parser import Expression, parsed
 from rparm.units import SECONDS, quantity
 
 MAX_RUNS = 10**9

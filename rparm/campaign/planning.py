@@ -31,7 +31,7 @@ from rparm.campaign.job import (
 )
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint, one_line, placed
 from rparm.fmi.model import INPUTS, TOLERANCE, Value, Variable
-from rparm.fmu_tools.compiler.expressions.expression import Expression
+from rparm.fmu_tools.compiler.expressions.parser import Expression
 from rparm.units import unit
 
 RUN, FAILURE = "run", "failure"  # columns of every table

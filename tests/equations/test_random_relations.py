@@ -12,7 +12,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from rparm.fmu_tools.compiler.expressions.expression import Node, parse
+from rparm.fmu_tools.compiler.expressions.expression import Node
+from rparm.fmu_tools.compiler.expressions.parser import parse
 
 from tests.equations.compiled import Model
 from tests.equations.examples import METHODS, made, simulated

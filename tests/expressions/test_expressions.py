@@ -7,17 +7,15 @@ import pytest
 from rparm.fmu_tools.compiler import units
 from rparm.fmu_tools.compiler.expressions.dimensions import ONE, dimension_of, of_exponents, shown
 from rparm.fmu_tools.compiler.expressions.expression import (
-    CONDITION,
     FUNCTIONS,
     ExpressionError,
     evaluated,
     in_order,
     names,
-    parse,
-    parsed,
-    with_kinds,
     written,
 )
+from rparm.fmu_tools.compiler.expressions.kinds import CONDITION, with_kinds
+from rparm.fmu_tools.compiler.expressions.parser import parse, parsed
 
 VALUES = {"x": 0.75, "y": -1.25, "z": 3.0}
 PYTHON = {name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)}

@@ -10,14 +10,8 @@ from fractions import Fraction
 
 from .. import units as si
 from ..units import BASE
-from .expression import (
-    EQUALITIES,
-    RELATIONS,
-    ExpressionError,
-    Node,
-    in_order,
-    table_unit,
-)
+from .expression import EQUALITIES, RELATIONS, ExpressionError, Node, in_order
+from .parser import table_unit
 
 Dimension = tuple[Fraction, ...]  # exponents, in the order of BASE
 LARGEST_ROOT = 100  # 0.3333333333333333 is 1/3

@@ -16,7 +16,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
-from ..expressions.expression import RELATIONS, Node, in_order, parse
+from ..expressions.expression import RANDOM, RELATIONS, Node, in_order
+from ..expressions.parser import parse
 from .tables import FAR, LookupTable
 
 ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
@@ -32,7 +33,6 @@ RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not i
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
 OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 SWITCHING = ("floor", "locate", *RELATIONS)  # results jump
-RANDOM = ("noise", "uniform")  # of whole numbers
 STILL = (*CONDITIONS, *RANDOM, "value_of", "entry", "locate", "floor")  # derivatives are 0
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 MOST_COUNTED = 2**30  # by floor of what moves

@@ -5,7 +5,9 @@ from itertools import groupby
 
 from declaration.load import shown
 
-from ..expressions.expression import ExpressionError, Node, at_indexes, parse, parse_ranges
+from ..expressions.expression import ExpressionError, Node
+from ..expressions.indexes import at_indexes
+from ..expressions.parser import parse, parse_ranges
 from .content import Element, ModelFile, ModelFileError, placed
 
 FOR = "for"

@@ -16,7 +16,8 @@ from typing import Any
 from pycparser import c_ast
 from pycparser.c_generator import CGenerator
 
-from ..expressions.expression import RELATIONS, ExpressionError, Lookup, Node, in_order, parse
+from ..expressions.expression import RELATIONS, ExpressionError, Node, in_order
+from ..expressions.parser import Lookup, parse
 from ..graph.graph import DERIVATIVES, Graph, Value
 from ..plain_c.expressions import ROUNDING
 from ..plain_c.interpreter import Interpreter

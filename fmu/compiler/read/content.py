@@ -13,19 +13,10 @@ from typing import Any
 from declaration.load import shown
 from declaration.schema import Terminal
 
-from ..expressions.expression import (
-    CONDITION,
-    NUMBER,
-    RANDOM,
-    ExpressionError,
-    Function,
-    Kind,
-    Lookup,
-    Node,
-    at_indexes,
-    in_order,
-    parse,
-)
+from ..expressions.expression import ExpressionError, Node, in_order
+from ..expressions.indexes import at_indexes
+from ..expressions.kinds import CONDITION, NUMBER, Kind
+from ..expressions.parser import RANDOM_FUNCTIONS, Function, Lookup, parse
 from ..graph.tables import LookupTable
 from ..units import Unit, parsed
 from .code import CodeFile
@@ -218,7 +209,7 @@ class ModelFile:
                 raise ModelFileError(f"expected an expression in quotes, got {shown(text)}")
             try:
                 if text not in self.parsed:
-                    self.parsed[text] = parse(text, RANDOM | self.functions)
+                    self.parsed[text] = parse(text, RANDOM_FUNCTIONS | self.functions)
                 indexes = self.sizes | element.indexes
                 tree = at_indexes(self.parsed[text], indexes, are_known=False)
             except ValueError as error:

@@ -15,20 +15,9 @@ from typing import Any
 from declaration.load import shown
 
 from ..expressions.dimensions import dimension_of, of_exponents
-from ..expressions.expression import (
-    CONDITION,
-    CONSTANTS,
-    NUMBER,
-    WHOLE,
-    ExpressionError,
-    Function,
-    Lookup,
-    Node,
-    in_order,
-    table_unit,
-    with_kinds,
-    with_names,
-)
+from ..expressions.expression import CONSTANTS, ExpressionError, Node, in_order, with_names
+from ..expressions.kinds import CONDITION, NUMBER, WHOLE, with_kinds
+from ..expressions.parser import Function, Lookup, table_unit
 from ..graph.tables import read as table_of
 from ..units import ANGLE, BASE, Unit
 from . import header, keys, terminals

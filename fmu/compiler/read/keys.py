@@ -9,15 +9,9 @@ from typing import Any
 
 from declaration.load import shown
 
-from ..expressions.expression import (
-    CONDITION,
-    FUNCTIONS,
-    FURTHER,
-    NO_NAMES,
-    WHOLE,
-    Kind,
-    finite_number,
-)
+from ..expressions.expression import FUNCTIONS, finite_number
+from ..expressions.kinds import CONDITION, WHOLE, Kind
+from ..expressions.parser import FURTHER, NO_NAMES
 from ..units import ANGLE, BASE
 from .content import (
     BOOLEAN,

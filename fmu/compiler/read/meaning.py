@@ -9,18 +9,16 @@ from declaration.load import shown
 from ..expressions import dimensions
 from ..expressions.dimensions import Dimension, dimension_of, of_exponents, times
 from ..expressions.expression import (
-    CONDITION,
     CONSTANTS,
     ExpressionError,
     derivative_of,
     evaluated,
     in_order,
-    kind_of,
     names,
-    with_elements,
-    with_kinds,
 )
 from ..expressions.hints import meant
+from ..expressions.indexes import with_elements
+from ..expressions.kinds import CONDITION, kind_of, with_kinds
 from ..units import BASE
 from .content import FOLLOWS, OPTIONS, SWITCHES, Expression, ModelFile, ModelFileError, placed
 

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache, partial
 from pathlib import Path
 
-from ..expressions.expression import CONDITION, RELATIONS, Node, derivative_of, written
+from ..expressions.expression import RELATIONS, Node, derivative_of, written
+from ..expressions.kinds import CONDITION
 from ..graph.graph import MOVING, Graph, Value
 from ..names import Fields
 from ..plain_c.memory import is_real

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial, reduce
 
-from ..expressions.expression import CONDITION, WHOLE, Kind, in_order
+from ..expressions.expression import in_order
+from ..expressions.kinds import CONDITION, WHOLE, Kind
 from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
 from ..read.content import COUNTS, SWITCHES, Change, ModelFile, Sampler

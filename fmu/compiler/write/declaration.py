@@ -8,7 +8,8 @@ from typing import Any
 
 from declaration.load import read as read_declaration
 
-from ..expressions.expression import CONDITION, WHOLE, in_order
+from ..expressions.expression import in_order
+from ..expressions.kinds import CONDITION, WHOLE
 from ..graph.graph import MOVING, Relation, Value
 from ..names import Field
 from ..read.content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed

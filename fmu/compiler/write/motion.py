@@ -8,7 +8,8 @@ Functions of the graph become those of `SLOPED`, whose slopes are nodes, too.
 from collections.abc import Iterator
 from typing import Any
 
-from ..expressions.expression import in_order, parse
+from ..expressions.expression import in_order
+from ..expressions.parser import parse
 from ..graph.graph import Graph, Value
 from ..read.content import ModelFile, Variable
 

@@ -1,0 +1,153 @@
+"""Indexes in expressions: elements of arrays, sums over a range, conditions that indexes decide."""
+
+import math
+from collections.abc import Collection, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import reduce
+
+from .expression import (
+    MOST_OPERATIONS,
+    OPERATIONS,
+    TOO_LARGE,
+    ExpressionError,
+    Node,
+    constant,
+    evaluated,
+    in_order,
+    names,
+)
+
+
+@dataclass(frozen=True)
+class Range:
+    """An index with its first and last value."""
+
+    index: str
+    first: Node
+    last: Node
+
+    def values(self, indexes: Mapping[str, int]) -> range:
+        """Return its values; `indexes`: sizes and other indexes."""
+        first, last = (_index(at_indexes(node, indexes)) for node in (self.first, self.last))
+        if last - first >= MOST_OPERATIONS:
+            raise ExpressionError(self.last.column, f"more than {MOST_OPERATIONS} values")
+        return range(first, last + 1)
+
+
+def at_indexes(root: Node, indexes: Mapping[str, int], are_known: bool = True) -> Node:
+    """Replace indexes by their values, elements by their names, and sums by their terms.
+
+    Conditions on indexes alone are decided. ExpressionError where an index is none; unless they
+    `are_known`, elements stay whose indexes follow from variables.
+    """
+    return _AtIndexes(dict(indexes), are_known).of(root)
+
+
+def with_elements(root: Node, elements: Mapping[str, Collection[tuple[int, ...]]]) -> Node:
+    """Add their elements to the look-ups by indexes that follow from variables.
+
+    elements: indexes of all elements, by the names of arrays. ExpressionError where there are none.
+    """
+    found: dict[Node, Node] = {}
+    for node in in_order([root]):
+        arguments = tuple(found[argument] for argument in node.arguments)
+        new = node if arguments == node.arguments else replace(node, arguments=arguments)
+        if node.op == "element":
+            base, numbers = node.name.partition("[")[0], [*map(_number_of, arguments)]
+            of = [
+                at
+                for at in elements.get(base, ())
+                if len(at) == len(numbers)
+                and all(n in (None, i) for n, i in zip(numbers, at, strict=True))
+            ]
+            if not of:
+                raise ExpressionError(node.column, f"there is no {base} with such indexes")
+            names = (f"{base}[{','.join(map(str, at))}]" for at in of)
+            own = tuple(Node("name", node.column, name=name) for name in names)
+            new = replace(node, arguments=arguments + own, of=tuple(of))
+        found[node] = new
+    return found[root]
+
+
+def _number_of(index: Node) -> int | None:
+    """Return the value of an index; None if it follows from variables."""
+    return None if names(index) else _index(index)
+
+
+class _AtIndexes:
+    def __init__(self, indexes: dict[str, int], are_known: bool) -> None:
+        self.indexes, self.are_known = indexes, are_known
+        self.count = 0  # of operations
+
+    def of(self, root: Node) -> Node:
+        found: dict[Node, Node] = {}
+        decided: set[Node] = set()  # by indexes and numbers
+        fixed: set[Node] = set()  # by numbers
+        nodes = in_order([root])
+        self.count += len(nodes)
+        if self.count > MOST_OPERATIONS:
+            raise ExpressionError(root.column, TOO_LARGE)
+        for node in nodes:
+            given = tuple(found[argument] for argument in node.arguments)
+            new = node if given == node.arguments else replace(node, arguments=given)
+            if node.op == "name" and node.name in self.indexes:
+                new = constant(node, self.indexes[node.name])
+                decided.add(new)
+            elif node.op in ("number", "literal"):
+                fixed.add(new)
+            elif node.op == "element" and not self.are_known and any(map(names, given)):
+                pass  # of variables
+            elif node.op == "element":
+                name = node.name.format(*map(_index, given))
+                new = Node("name", node.column, name=name)
+            elif node.op == "sum":
+                new = self.summed(node, given)
+            elif node.op in ("if", "and", "or") and decided.intersection(given):
+                new = _decided(new, decided)
+            elif node.op in OPERATIONS and {*given} <= fixed:
+                fixed.add(new)
+            elif node.op in OPERATIONS and {*given} <= fixed | decided:
+                with suppress(ArithmeticError, ValueError):
+                    new = constant(node, evaluated(new, {}))
+                    decided.add(new)
+            found[node] = new
+        return found[root]
+
+    def summed(self, node: Node, given: tuple[Node, ...]) -> Node:
+        """Return the terms of a sum, added from the first on."""
+        if node.name in self.indexes:
+            raise ExpressionError(node.column, f"index {node.name!r} has a meaning already")
+        terms = []
+        for value in Range(node.name, *given).values({}):
+            self.indexes[node.name] = value
+            terms.append(self.of(node.body))
+        self.indexes.pop(node.name, None)
+        if not terms:
+            return constant(node, 0)
+        return reduce(lambda a, b: Node("+", node.column, (a, b)), terms)
+
+
+def _decided(node: Node, decided: Collection[Node]) -> Node:
+    """Return the part of an operation that counts, where a condition is decided."""
+    first, second, *_ = node.arguments
+    if node.op == "if":
+        chosen = node.arguments[1 if first.value else 2]
+        return chosen if first in decided else node
+    rest, known = (second, first) if first in decided else (first, second)
+    return rest if known.value == (node.op == "and") else known
+
+
+def _index(node: Node) -> int:
+    """Return the value of an index; ExpressionError if it is not known or not whole."""
+    unknown = names(node)
+    if unknown:
+        text = f"{min(unknown)!r} is no size and no index of for or sum"
+        raise ExpressionError(node.column, text)
+    try:
+        value = evaluated(node, {})
+    except (KeyError, ArithmeticError, ValueError):
+        value = math.nan
+    if not math.isfinite(value) or value != int(value):
+        raise ExpressionError(node.column, "expected a whole number as index")
+    return int(value)
