@@ -1,34 +1,28 @@
-"""What the model descriptions of all versions of FMI have in common."""
+"""What the model descriptions of all versions of FMI share, and how their templates are filled."""
 
-import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 from declaration.load import Declaration
-from declaration.schema import (
-    Boolean,
-    Display,
-    Enumeration,
-    Experiment,
-    Float64,
-    Model,
-    UnitEntry,
-    Variable,
-)
+from declaration.schema import Boolean, Display, Enumeration, Float64, UnitEntry, Variable
+from jinja2 import Environment, FileSystemLoader
+from markupsafe import Markup
 from program import Provenance
 
-LOG_CATEGORIES = {
-    "logEvents": "Events, for example initialization and reset",
-    "logStatusWarning": "Something to know about a call that succeeded",
-    "logStatusDiscard": "Why a function returns {prefix}Discard",
-    "logStatusError": "Why a function returns {prefix}Error",
-    "logStatusFatal": "Why a function returns {prefix}Fatal",
-    "logAll": "All messages, and every call",
-}
+
+def filled(template: str, **values: object) -> str:
+    """Return the text of a template of this folder."""
+    return _templates.get_template(template).render(values)
 
 
-def texts_of(declaration: Declaration, provenance: Provenance) -> dict[str, str]:
-    """Return attributes of the root: what the model is and where it comes from."""
+def described(
+    version: str, declaration: Declaration, provenance: Provenance, **values: object
+) -> str:
+    """Return the text of modelDescription.xml; `values`: what this version of FMI adds."""
     model = declaration.model
-    texts = {
+    origin = {
+        "description": model.description,
         "author": provenance.author,
         "version": provenance.version,
         "copyright": provenance.copyright,
@@ -36,32 +30,24 @@ def texts_of(declaration: Declaration, provenance: Provenance) -> dict[str, str]
         "generationTool": f"{model.name} {provenance.version}",
         "generationDateAndTime": provenance.date,
     }
-    given = {key: text for key, text in texts.items() if text is not None}
-    return {"description": model.description, **given}
+    shared = {"declaration": declaration, "model": model, "origin": origin, "prefix": version}
+    return filled(f"{version}/modelDescription.xml.in", **shared, **values)
 
 
-def add_units(root: ET.Element, units: dict[str, UnitEntry]) -> None:
-    """Write UnitDefinitions: SI base exponents, and the display units."""
-    definitions = ET.SubElement(root, "UnitDefinitions")
-    for name, unit in sorted(units.items()):
-        element = ET.SubElement(definitions, "Unit", name=name)
-        exponents = {base: str(exponent) for base, exponent in unit.exponents.items()}
-        ET.SubElement(element, "BaseUnit", exponents)
-        displays = {name: Display(name=name, factor=f) for name, f in unit.display.items()}
-        for display in (displays | unit.further).values():
-            keys = {"name": display.name, "factor": repr(display.factor)}
-            keys |= {"offset": repr(display.offset)} if display.offset else {}
-            ET.SubElement(element, "DisplayUnit", keys)
+def display_units(unit: UnitEntry) -> list[Display]:
+    """Return the display units of a unit: those of all its variables, and those of some."""
+    displays = {name: Display(name=name, factor=f) for name, f in unit.display.items()}
+    return [*(displays | unit.further).values()]
 
 
-def display_unit(variable: Float64, units: dict[str, UnitEntry]) -> dict[str, str]:
-    """Return the attribute for the display unit of a variable, if it has one."""
+def display_unit(variable: Float64, units: Mapping[str, UnitEntry]) -> str | None:
+    """Return the name of the display unit of a variable, if it has one."""
     if variable.display:
-        return {"displayUnit": variable.display.name}
-    return dict(zip(["displayUnit"], units[variable.unit].display, strict=False))
+        return variable.display.name
+    return next(iter(units[variable.unit].display), None)
 
 
-def type_names(variables: dict[str, Variable]) -> dict[str, str]:
+def type_names(variables: Mapping[str, Variable]) -> dict[str, str]:
     """Types' names by enumerations, for example SolverMethodType for solver_method.
 
     a_b and aB have two, and no variable has the name of a type: _ is added where it is needed.
@@ -78,45 +64,30 @@ def type_names(variables: dict[str, Variable]) -> dict[str, str]:
     return names
 
 
-def add_items(parent: ET.Element, variable: Enumeration) -> None:
-    """Write the items of an enumeration: their values count from 1."""
-    for value, (item, keys) in enumerate(variable.items.items(), start=1):
-        ET.SubElement(parent, "Item", name=item, value=str(value), description=keys.description)
+def values(variable: Variable) -> dict[str, object]:
+    """Return attributes reinit, start, min and max, None for those that the variable lacks."""
+    keys = ("start",) if isinstance(variable, Boolean) else ("start", "min", "max")
+    found = {key: getattr(variable, key) for key in keys}
+    return {"reinit": variable.reinit or None, **found}
 
 
-def value_attributes(variable: Variable) -> dict[str, str]:
-    """Return attributes start, min and max, of those that the variable has."""
-    if isinstance(variable, Boolean):
-        return {} if variable.start is None else {"start": str(variable.start).lower()}
-    values = {key: getattr(variable, key) for key in ("start", "min", "max")}
-    return {key: repr(value) for key, value in values.items() if value is not None}
+def quoted(value: object) -> Markup:
+    """Write the value of an attribute."""
+    text = str(value).lower() if isinstance(value, bool) else str(value)
+    return Markup(quoteattr(text, {'"': "&quot;"}))
 
 
-def add_log_categories(root: ET.Element, prefix: str) -> None:
-    """Write LogCategories; the version's constants begin with `prefix`."""
-    categories = ET.SubElement(root, "LogCategories")
-    for name, description in LOG_CATEGORIES.items():
-        text = description.format(prefix=prefix)
-        ET.SubElement(categories, "Category", name=name, description=text)
+def attributes(given: Mapping[str, object]) -> Markup:
+    """Write attributes, without those that are None."""
+    known = {name: quoted(value) for name, value in given.items() if value is not None}
+    return Markup("").join(Markup(f" {name}={value}") for name, value in known.items())
 
 
-def add_experiment(root: ET.Element, experiment: Experiment) -> None:
-    numbers = {"startTime": experiment.start, "stopTime": experiment.stop}
-    numbers |= {"tolerance": experiment.tolerance, "stepSize": experiment.step}
-    ET.SubElement(root, "DefaultExperiment", {key: repr(x) for key, x in numbers.items()})
-
-
-def add_annotation(root: ET.Element, names: tuple[str, str], key: str, model: Model) -> None:
-    """Write what `rparm linearize` should know; names and key: of the elements in this version."""
-    notes = {"flat": model.flat, "modulated": model.modulated}
-    if any(notes.values()):
-        annotation = ET.SubElement(ET.SubElement(root, names[0]), names[1], {key: "rparm"})
-        annotation = ET.SubElement(annotation, "linearize")  # FMI 2.0 allows a single element
-        for tag, texts in notes.items():
-            for text in texts:
-                ET.SubElement(annotation, tag, text=text)
-
-
-def document(root: ET.Element) -> str:
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+_templates = Environment(
+    loader=FileSystemLoader(Path(__file__).parent),
+    autoescape=True,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+)
+_templates.filters |= {"attributes": attributes, "display_units": display_units, "quoted": quoted}

@@ -129,7 +129,8 @@ function(add_fmu name)
   endif()
 
   # tables and model descriptions, again whenever a declaration changes
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/compiler/units.py ${FMU_SOURCE_DIR}/fmi*/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/compiler/units.py
+       ${FMU_SOURCE_DIR}/fmi*/*.py ${FMU_SOURCE_DIR}/*.xml.in ${FMU_SOURCE_DIR}/fmi*/*.xml.in)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/program.py)
   set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${variables}
                --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
@@ -189,7 +190,7 @@ function(add_fmu name)
       OUTPUT ${references}
       COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/references.py ${variables} ${ARG_REFERENCES}
               --folder ${folder} --output ${out}/references
-      DEPENDS ${FMU_SOURCE_DIR}/references.py ${FMU_SOURCE_DIR}/program.py ${declaration} ${reference_files}
+      DEPENDS ${FMU_SOURCE_DIR}/references.py ${generator} ${declaration} ${reference_files}
       COMMENT "Collecting the references of ${name}"
       VERBATIM)
   endif()

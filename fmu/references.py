@@ -8,7 +8,6 @@ says what each file is (FMI Layered Standard References 1.0.0-alpha.1).
 import argparse
 import sys
 import tomllib
-import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +15,10 @@ from typing import Any
 
 from declaration.load import Declaration, load
 from declaration.schema import Boolean, Enumeration, Float64, Variable
-from description_parts import document
+from description_parts import filled
 from program import WrongInputError, atomic_write, program
 
 MANIFEST = "fmi-ls-manifest.xml"
-NAME = "org.fmi-standard.fmi-ls-ref"
-VERSION = "1.0.0-alpha.1"
-DESCRIPTION = "Layered Standard providing information on related files included in an FMU."
-NAMESPACES = {
-    "fmi-ls": "http://fmi-standard.org/fmi-ls-manifest",
-    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
-    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
-}
 PARAMETERS = "parameters.ssv"
 
 # of a scenario, by the ending of their names: role, type and what they are
@@ -71,34 +62,20 @@ def read(path: Path) -> Scenario:
     return Scenario(path.stem, path, title, parameters | initial)
 
 
-def tag(name: str) -> str:
-    """A name with its prefix, as ElementTree wants it."""
-    prefix, _, local = name.partition(":")
-    return f"{{{NAMESPACES[prefix]}}}{local}"
-
-
-# ---- The parameter set ---------------------------------------------------------------------------
 def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
     """Text of the .ssv (SSP 1.0) with the values that are not the start values of the FMU."""
-    root = ET.Element(
-        tag("ssv:ParameterSet"), version="1.0", name=scenario.name, description=scenario.title
-    )
-    parameters = ET.SubElement(root, tag("ssv:Parameters"))
-    units = set()
+    values, units = {}, set()
     for name, value in scenario.values.items():
         variable = declaration.variables.get(name)
         if variable is None:
             raise WrongInputError(f"{scenario.path}: '{name}' is not declared")
-        parameter = ET.SubElement(parameters, tag("ssv:Parameter"), name=name)
-        kind, attributes = typed(variable, value, f"{scenario.path}: {name}")
-        ET.SubElement(parameter, tag(f"ssv:{kind}"), attributes)
+        values[name] = typed(variable, value, f"{scenario.path}: {name}")
         units |= {variable.unit} if isinstance(variable, Float64) else set()
-    if units:
-        add_units(root, sorted(units), declaration)
-    return document(root)
+    exponents = {name: declaration.units[name] for name in sorted(units)}
+    return filled("parameters.ssv.in", scenario=scenario, values=values, units=exponents)
 
 
-def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, str]]:
+def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, Any]]:
     """Return the element for a value, with its attributes."""
     if isinstance(variable, Enumeration):
         if not isinstance(value, str) or value not in variable.items:
@@ -109,34 +86,8 @@ def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, st
     if type(value) not in wanted[variable.type]:
         raise WrongInputError(f"{place} = {value!r:.40} is not a value of type {variable.type}")
     if isinstance(variable, Float64):
-        return "Real", {"value": repr(float(value)), "unit": variable.unit}
-    if isinstance(variable, Boolean):
-        return "Boolean", {"value": str(value).lower()}
-    return "Integer", {"value": str(value)}
-
-
-def add_units(root: ET.Element, names: Sequence[str], declaration: Declaration) -> None:
-    """Write the units in use by their SI base exponents."""
-    units = ET.SubElement(root, tag("ssv:Units"))
-    for name in names:
-        exponents = {b: str(e) for b, e in declaration.units[name].exponents.items()}
-        unit = ET.SubElement(units, tag("ssc:Unit"), name=name)
-        ET.SubElement(unit, tag("ssc:BaseUnit"), exponents)
-
-
-# ---- The manifest --------------------------------------------------------------------------------
-def manifest(model: str, scenarios: Sequence[Scenario]) -> str:
-    """Return the text of fmi-ls-manifest.xml."""
-    root = ET.Element("fmiReferences")
-    root.set(tag("fmi-ls:fmi-ls-name"), NAME)
-    root.set(tag("fmi-ls:fmi-ls-version"), VERSION)
-    root.set(tag("fmi-ls:fmi-ls-description"), DESCRIPTION)
-    for scenario in scenarios:
-        for ending, (role, kind, what) in FILES.items():
-            source = f"{scenario.name}/{file_name(model, ending)}"
-            related = {"source": source, "role": role, "type": kind}
-            ET.SubElement(root, "Related", related, description=f"{what} ({scenario.title})")
-    return document(root)
+        return "Real", {"value": float(value), "unit": variable.unit}
+    return "Boolean" if isinstance(variable, Boolean) else "Integer", {"value": value}
 
 
 def file_name(model: str, ending: str) -> str:
@@ -144,14 +95,14 @@ def file_name(model: str, ending: str) -> str:
     return model + ending if ending.startswith("_") else ending
 
 
-# ---- All files -----------------------------------------------------------------------------------
 def files(
     declaration: Declaration, names: Sequence[str], folder: Path
 ) -> Iterator[tuple[str, bytes]]:
     """Return name and content of each file; folder: of the model."""
     model = declaration.model.name
     scenarios = [read(folder / "scenarios" / f"{name}.toml") for name in names]
-    yield MANIFEST, manifest(model, scenarios).encode()
+    named = {"model": model, "scenarios": scenarios, "files": FILES, "file_name": file_name}
+    yield MANIFEST, filled(f"{MANIFEST}.in", **named).encode()
     for scenario in scenarios:
         for ending in FILES:
             name = file_name(model, ending)
@@ -177,8 +128,6 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, help="of the model, if variables.toml is elsewhere")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
     arguments = parser.parse_args()
-    for prefix, namespace in NAMESPACES.items():
-        ET.register_namespace(prefix, namespace)
     declaration = load(arguments.variables)
     folder = arguments.folder or arguments.variables.parent
     write(arguments.output, dict(files(declaration, arguments.names, folder)))

@@ -1,11 +1,10 @@
 """Writes modelDescription.xml of FMI 2.0 (section 2.2 of the specification)."""
 
-import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-import description_parts
 from declaration.load import Declaration, DeclarationError
-from declaration.schema import Float64, UnitEntry, Variable
+from declaration.schema import Float64, Variable
+from description_parts import described, display_unit, type_names, values
 from program import Provenance
 
 TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration", "boolean": "Boolean"}
@@ -15,30 +14,31 @@ def model_description(
     declaration: Declaration, provenance: Provenance, sources: Sequence[str] = ()
 ) -> str:
     """Text of modelDescription.xml; `sources`: files in the FMU's sources/ that are compiled."""
-    model = declaration.model
     variables = with_aliases(declaration)
-    index = {name: str(i) for i, name in enumerate(variables, start=1)}
-    root = ET.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=model.name,
-        guid=declaration.guid,
-        **description_parts.texts_of(declaration, provenance),
-        variableNamingConvention=model.naming,
-        numberOfEventIndicators=str(len(model.event_indicators)),
+    index = {name: i for i, name in enumerate(variables, start=1)}
+
+    def typed(variable: Variable, type_name: str | None) -> dict[str, object]:
+        """Return the attributes of the element of the variable's type."""
+        keys = {"declaredType": type_name or None}
+        if isinstance(variable, Float64):
+            shown = display_unit(variable, declaration.units)
+            keys |= {"unit": variable.unit, "displayUnit": shown}
+        keys |= {"derivative": index.get(variable.derivative_of), **values(variable)}
+        return {**keys, "nominal": getattr(variable, "nominal", None)}
+
+    return described(
+        "fmi2",
+        declaration,
+        provenance,
+        sources=sources,
+        variables=variables,
+        types=type_names(variables),
+        names=TYPES,
+        shared=shared_keys,
+        typed=typed,
+        index=index,
+        structure=structure(variables, index),
     )
-    add_interfaces(root, model.name, sources)
-    description_parts.add_units(root, declaration.units)
-    types = description_parts.type_names(variables)
-    add_types(root, variables, types)
-    description_parts.add_log_categories(root, "fmi2")
-    description_parts.add_experiment(root, declaration.experiment)
-    description_parts.add_annotation(root, ("VendorAnnotations", "Tool"), "name", model)
-    scalars = ET.SubElement(root, "ModelVariables")
-    for name, variable in variables.items():
-        add_variable(scalars, name, variable, types.get(name), index, declaration.units)
-    add_structure(root, variables, index)
-    return description_parts.document(root)
 
 
 def with_aliases(declaration: Declaration) -> dict[str, Variable]:
@@ -69,82 +69,31 @@ def with_aliases(declaration: Declaration) -> dict[str, Variable]:
     return variables
 
 
-def add_interfaces(root: ET.Element, identifier: str, sources: Sequence[str]) -> None:
-    """Write ModelExchange and CoSimulation with what they can do, and their SourceFiles."""
-    shared = {
-        "modelIdentifier": identifier,
-        "canNotUseMemoryManagementFunctions": "true",
-        "canGetAndSetFMUstate": "true",
-        "canSerializeFMUstate": "true",
-        "providesDirectionalDerivative": "true",
+def shared_keys(name: str, variable: Variable) -> dict[str, object]:
+    """Return the attributes that variables of all types can have."""
+    keys = ("description", "causality", "variability", "initial")
+    given = {key: getattr(variable, key) or None for key in keys}
+    return {"name": name, "valueReference": variable.reference, **given}
+
+
+def structure(
+    variables: Mapping[str, Variable], index: Mapping[str, int]
+) -> dict[str, dict[int, list[int]]]:
+    """Return exact dependencies (section 2.2.8 of the specification) by unknowns' indexes."""
+    unknowns = {name: variable for name, variable in variables.items() if variable.is_unknown}
+    calculated = {name: v for name, v in unknowns.items() if v.initial == "calculated"}
+    outputs = {name: v for name, v in variables.items() if v.causality == "output"}
+    derivatives = {name: v for name, v in calculated.items() if v.derivative_of}
+    later = {"Outputs": outputs, "Derivatives": derivatives}
+    knowns = {
+        section: {name: v.dependencies or [] for name, v in of_section.items()}
+        for section, of_section in later.items()
     }
-    co_simulation = {
-        "canHandleVariableCommunicationStepSize": "true",
-        "canInterpolateInputs": "true",
-        "maxOutputDerivativeOrder": "2",
+    knowns["InitialUnknowns"] = {n: v.initial_knowns(variables) for n, v in calculated.items()}
+    return {
+        section: {
+            index[name]: sorted(index[known] for known in of_unknown)
+            for name, of_unknown in of_section.items()
+        }
+        for section, of_section in knowns.items()
     }
-    for kind, capabilities in (("ModelExchange", shared), ("CoSimulation", shared | co_simulation)):
-        interface = ET.SubElement(root, kind, capabilities)
-        if sources:
-            files = ET.SubElement(interface, "SourceFiles")
-            for name in sources:
-                ET.SubElement(files, "File", name=name)
-
-
-def add_types(root: ET.Element, variables: dict[str, Variable], types: dict[str, str]) -> None:
-    """Write TypeDefinitions: one type for each enumeration."""
-    if not types:
-        return
-    definitions = ET.SubElement(root, "TypeDefinitions")
-    for name, type_name in types.items():
-        simple = ET.SubElement(definitions, "SimpleType", name=type_name)
-        description_parts.add_items(ET.SubElement(simple, "Enumeration"), variables[name])
-
-
-def add_variable(
-    parent: ET.Element,
-    name: str,
-    variable: Variable,
-    type_name: str | None,
-    index: dict[str, str],
-    units: dict[str, UnitEntry],
-) -> None:
-    keys = {"name": name, "valueReference": str(variable.reference)}
-    for key in ("description", "causality", "variability", "initial"):
-        if text := getattr(variable, key):
-            keys[key] = text
-    scalar = ET.SubElement(parent, "ScalarVariable", keys)
-    element = ET.SubElement(scalar, TYPES[variable.type])
-    if type_name is not None:
-        element.set("declaredType", type_name)
-    if isinstance(variable, Float64):
-        element.set("unit", variable.unit)
-        element.attrib |= description_parts.display_unit(variable, units)
-    if variable.derivative_of is not None:
-        element.set("derivative", index[variable.derivative_of])
-    if variable.reinit:
-        element.set("reinit", "true")
-    for key, text in description_parts.value_attributes(variable).items():
-        element.set(key, text)
-    if isinstance(variable, Float64) and variable.nominal is not None:
-        element.set("nominal", repr(variable.nominal))
-
-
-def add_structure(root: ET.Element, variables: dict[str, Variable], index: dict[str, str]) -> None:
-    """Write ModelStructure with exact dependencies (section 2.2.8 of the specification)."""
-    structure = ET.SubElement(root, "ModelStructure")
-    calculated = {n: v for n, v in variables.items() if v.is_unknown and v.initial == "calculated"}
-    for section, unknowns, is_initial in (
-        ("Outputs", {n: v for n, v in variables.items() if v.causality == "output"}, False),
-        ("Derivatives", {n: v for n, v in calculated.items() if v.derivative_of}, False),
-        ("InitialUnknowns", calculated, True),
-    ):
-        if not unknowns:
-            continue
-        element = ET.SubElement(structure, section)
-        for name, unknown in unknowns.items():
-            later = unknown.dependencies or []
-            knowns = unknown.initial_knowns(variables) if is_initial else later
-            indices = sorted(int(index[known]) for known in knowns)
-            dependencies = " ".join(map(str, indices))
-            ET.SubElement(element, "Unknown", index=index[name], dependencies=dependencies)
