@@ -38,12 +38,13 @@ def test_they_follow_the_motion(version: str, method: int, fmi_type: str) -> Non
     # by the exact motion, except within a tolerance of the switches
     w = np.sqrt(0.1)
     x, v = 1.5 / w * np.sin(w * run["time"]), 1.5 * np.cos(w * run["time"])
-    sure = np.min(np.abs([x - 3, x - 1.5, v]), axis=0) > 1e-5
+    sure = np.min(np.abs([x - 3, x - 3.25, x - 1.5, v]), axis=0) > 1e-5
     hot, warm = x > 3, (x > 1.5) & (x <= 3)
     level = np.where(hot, 3, np.where(warm, 2, 1))
     expected = {
         "hot": hot, "warm": warm, "is_warm": warm, "level": level, "state": np.minimum(level, 2),
         "gear": np.where(hot, np.where(v > 0, 1, -1), 2),
+        "rising": np.where(v > 0, hot, ~warm), "near": hot & (x < 3.25),
     }  # fmt: skip
     assert np.sum(sure) > 900
     for name, values in expected.items():

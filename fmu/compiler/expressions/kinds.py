@@ -67,6 +67,8 @@ def _kind(node: Node, given: list[Kind], kinds: Mapping[str, Kind]) -> Kind:
         return TEXT
     if node.op in ("literal", *LOGIC, *RELATIONS, *EQUALITIES):
         return CONDITION
+    if node.op == "if" and {*given[1:]} == {CONDITION}:
+        return CONDITION
     if node.op == "if" and not {*given[1:]} <= {NUMBER, WHOLE, CONDITION}:
         return max(given[1:], key=lambda kind: isinstance(kind, tuple))
     if node.op == "element":
@@ -87,7 +89,8 @@ def _needed(node: Node, own: Kind, found: Mapping[Node, Kind]) -> list[Kind]:
         return [CONDITION] * len(given)
     if node.op == "if":
         is_item = not {*given[1:]} <= {NUMBER, WHOLE, CONDITION}
-        return [CONDITION, *[own if is_item else NUMBER] * 2]
+        of_number = CONDITION if found[node] == CONDITION else NUMBER
+        return [CONDITION, *[own if is_item else of_number] * 2]
     if node.op in RANDOM:
         return [WHOLE] * len(given)
     if node.op == "element":

@@ -318,6 +318,9 @@ class Graph:
 
     def choice(self, condition: Value, first: Value, second: Value) -> Value:
         """The "if" of a text: not a number where a relation that decides is not defined."""
+        if first.op in CONDITIONS:
+            otherwise = self.value("and", self.value("not", condition), second)
+            return self.value("or", self.value("and", condition, first), otherwise)
         chosen, unknown = self.value("if", condition, first, second), self.unknown(condition)
         return (
             chosen if unknown is None else self.value("if", unknown, self.number(math.nan), chosen)
