@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 from rparm import api
+from rparm.fmi.fmu_file import Fmu
 from tests.equations.compiled import Model
 from tests.equations.examples import METHODS, MODELS, initializing, made, quick, simulated
 from tests.support.rparm_project import Console
@@ -290,6 +291,32 @@ def test_limits_of_inputs_follow_at_once_within_each_other() -> None:
         instance.setReal([at["u"], at["high"]], [u, high])
         expected = max(min(max(min(u, high), -2.0), 1.5), -3.0 if high > 0.0 else -1.0)
         assert instance.getReal([at["y"]]) == [expected]
+
+
+@pytest.mark.parametrize("version", ["", "fmi3"])
+def test_a_state_is_beyond_a_new_limit_from_the_next_step_on(version: str) -> None:
+    """A relation of a state changes at events only: until then all values are as before it."""
+    fmu = made(MODELS["following_values"]["BOUNDED"])
+    with Fmu(fmu.parent / version / fmu.name) as opened, opened.instance("bounded") as instance:
+        instance.set_up(0.0, None)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        values, t = instance.reals(["x", "y", "z", "der_x"]), 0.0
+        for limit, top in ((2.0, 5.0), (0.5, 5.0), (0.5, 0.25), (2.0, 0.25), (0.5, 9.0)):
+            values.get()
+            x_before, _, _, rate_before = values.view.tolist()
+            was_over = instance.discrete("over")
+            instance.set("limit", limit)
+            instance.set("top", top)
+            values.get()
+            x, _, _, rate = values.view.tolist()
+            assert (x, rate, instance.discrete("over")) == (x_before, rate_before, was_over)
+            instance.do_step(t, 2.0**-30)
+            t += 2.0**-30
+            values.get()
+            x, y, z, rate = values.view.tolist()
+            assert (y, z, instance.discrete("over")) == (min(x, limit), min(x, top), x > limit)
+            assert rate == (0.5 if x > limit else 0.25)
 
 
 def test_an_importer_cannot_set_a_start_that_follows(spring: Path) -> None:
