@@ -453,7 +453,7 @@ def linearize(
     inputs, outputs : sequence of str, optional
         Those of the model; default: all.
     variant, break_at, without
-        Of a system: its parameter set (default: that of System.run), an input whose connection is
+        Of a system: its parameter set (default: as for System.run), an input whose connection is
         cut, and components that are taken as ideal.
 
     Returns

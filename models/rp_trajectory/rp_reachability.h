@@ -53,8 +53,8 @@ static inline struct near_point nearest_of_circle(const struct rp_trajectory_par
     return end.distance < start.distance ? end : start;
 }
 
-/* The nearest point of the line or the swept arc; of point_to_point, every point of which can be
- * reached, that of the arc. */
+/* The nearest point of the line or the swept arc; of the arc for point_to_point, too, every point
+ * of which can be reached. */
 static inline struct near_point nearest_of_path(const struct rp_trajectory_parameters *p) {
     return p->motion == RP_TRAJECTORY_MOTION_LINE ? nearest_of_line(p) : nearest_of_circle(p);
 }

@@ -105,7 +105,9 @@ def _security(options: argparse.Namespace) -> "Security | None":
             raise UserError("--tls-ca, --tls-cert, --tls-key: are for a --scheduler")
         return None
     if options.no_dashboard:
-        raise UserError("--no-dashboard: that of a --scheduler is switched off where it starts")
+        raise UserError(
+            "--no-dashboard: a --scheduler has its own dashboard: switch it off where it starts"
+        )
     from rparm.campaign import engine  # takes long
 
     return engine.security_for(options.scheduler, *certificates)

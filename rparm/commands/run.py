@@ -157,7 +157,7 @@ def _files(names: Sequence[str]) -> tuple[list[Path], list[Path]]:
             raise UserError(f"{path}: {missing(path)}")
         elif own.setdefault(path.stem, path) != path:
             other = own[path.stem]
-            raise UserError(f"{path}: its page would have the name of that of {other}")
+            raise UserError(f"{path}: its page would have the same name as the page of {other}")
     return list(files), list(own.values())
 
 

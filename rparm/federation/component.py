@@ -61,10 +61,10 @@ class Part:
             return
         (here, own), (there, foreign) = self.system.rsplit(" ", 1), other.rsplit(" ", 1)
         if here != there:
-            variants = f"its variant is {here!r}, that of the federation is {there!r}"
+            variants = f"its variant is {here!r}, the federation's is {there!r}"
             raise UserError(f"{self.component}: {variants}")
         raise UserError(
-            f"{self.component}: its file is not that of the federation (SHA-256 {own[:12]}..., "
+            f"{self.component}: its file is not the federation's (SHA-256 {own[:12]}..., "
             f"expected {foreign[:12]}...): copy the file"
         )
 

@@ -2,7 +2,7 @@
 
 An equilibrium is where ticks of samplers change nothing, all derivatives of states are 0, but those
 that are a velocity which is given, and outputs have the values that they are to have. Some states
-and inputs are free. Where nothing rests and a velocity is free, it is a steady motion: that of a
+and inputs are free. Where nothing rests and a velocity is free, it is a steady motion, as of a
 motor under a voltage.
 
 What is left of an equation is compared with its terms, and Newton's step with the variable that it

@@ -72,7 +72,7 @@ static bool read_node(struct model *model, int i) {
             node->function =
                 strcmp(word, FUNCTIONS[f].name) == 0 ? FUNCTIONS[f].of : node->function;
         }
-        // its slope may come later; that of what is no part of the series is itself
+        // its slope may come later; what is no part of the series is its own slope
         read = node->function != NULL && read_counts(arguments, 1, i) &&
                read_counts(&node->slope, 1, model->count);
     } else if (operation >= SUM) {

@@ -51,7 +51,7 @@ struct step {
 /* What steps calculate with. */
 struct prover {
     struct model model;
-    struct series centre, hull;    /* the box has that of the centre, which is done by then */
+    struct series centre, hull;    /* the box has the centre's, which is done by then */
     struct ball per_order[ORDERS]; /* 1 / k */
     struct step step;
 };

@@ -124,7 +124,7 @@ class Convergence:
         """Broken rules, one sentence each."""
         return [
             f"{NAMES[i]}: slope {self.slopes[i]:.2f} over {self.fitted[i].sum()} steps whose "
-            f"error is {CLEAR_OF_INTEGRATION:g} times that of the integration, expected {POWERS[i]}"
+            f"error is {CLEAR_OF_INTEGRATION:g} times the integration's, expected {POWERS[i]}"
             for i in range(len(self.errors))
             if not self.holds(i)
         ]

@@ -34,7 +34,7 @@ double random_uniform(double seed, double k, double stream) {
     if (!are_whole(seed, k, stream)) {
         return (double)NAN;
     }
-    // another generator than that of normal numbers, which would follow from these
+    // not the generator of normal numbers, which would follow from these
     const uint64_t state = finalize(start_of(seed, stream));
     return (double)output(state, (uint64_t)(int64_t)k) * 0x1p-53;
 }

@@ -52,7 +52,7 @@ OPTIONAL = (
 )  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]
-# in one environment, that of the tests
+# in one environment: the tests'
 TOGETHER = ("run", "campaign", "federation", "control", "dev")
 
 Lock = dict[str, Requirement]

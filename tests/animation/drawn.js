@@ -64,7 +64,7 @@ function collars(row, q2) {
   return [1.15 * bar + 0.1 * scale + 0.3 * bar, -1.15 * bar - 0.2 * scale - 0.3 * bar]
     .map(along => colourAt([x + along, y - 0.5 * bar]));
 }
-/** Colours at the middle of each block: its half and that of link 1 beyond the limit. */
+/** Colours at the middle of each block: its half, and link 1 beyond the limit. */
 function blocks(row, limits) {
   player.show(row);
   const {scale, bar} = player.view, [x, y] = toPixel(player.view, [0, 0]);
@@ -86,7 +86,7 @@ function payload(row) {
   const [x, y] = toPixel(player.view, [0.8, 0.2]), {bar} = player.view;
   return colourAt([x + bar, y + bar]);
 }
-/** Colour beside the middle of link 1 of the reference, and that of references. */
+/** Colour beside the middle of the reference's link 1, and the colour of references. */
 function outline() {
   const [x, y] = toPixel(player.view, [0.25 * Math.cos(0.4), 0.25 * Math.sin(0.4)]);
   const beside = player.view.bar / 2 + 3.5;

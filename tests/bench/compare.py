@@ -215,7 +215,7 @@ def compared(rows: list[dict]) -> list[dict]:
     for work in (C1, C10, C100) if (C1, PLAIN) in steps else ():
         for method in ("erk", "taylor"):
             row = {"group": "against", "work": work}
-            row["run"] = f"error of {method} to that of the plain loop"
+            row["run"] = f"error of {method} over the plain loop's"
             row["ratio"] = steps[work, method]["error"] / steps[work, PLAIN]["error"]
             more.append(judged(row, "ratio", 1.0))
     if (C1, "taylor") in steps:

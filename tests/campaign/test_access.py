@@ -176,7 +176,7 @@ def test_wrong_certificates_are_refused(
         ([TLS, *options(ca, cert, garbage)], f"{cert}, {garbage}: are not a certificate and its"),
         ([TLS, *options(ca, cert, other[2])], f"{cert}, {other[2]}: are not a certificate and its"),
         ([TLS, *options(*locked)], "private key without a password"),
-        ([TCP, "--no-dashboard"], "--no-dashboard: that of a --scheduler"),
+        ([TCP, "--no-dashboard"], "--no-dashboard: a --scheduler has its own dashboard"),
         (["nonsense://x"], "nonsense://x: the scheduler cannot be reached"),
     ]
     command = ("campaign", write(tmp_path, changes=FEW), "--output", tmp_path / "out")

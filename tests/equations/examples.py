@@ -48,7 +48,7 @@ def runtime(level: str) -> building.Runtime:
 
 
 def quick(path: Path, output: Path, level: str = "-O1") -> Path:
-    """The FMU of FMI 2.0, and that of 3.0 below fmi3: only what a run needs, with the same bits."""
+    """The FMU of FMI 2.0, and in fmi3 the one of 3.0: only what a run needs, with the same bits."""
     file = read(path, declaration.solver_names())
     references = lock.references(lock.path_of(path), declaration.keys(file))
     made, versions = runtime(level), {"fmi2": output, "fmi3": output / "fmi3"}

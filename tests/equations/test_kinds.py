@@ -168,7 +168,7 @@ def test_a_linear_model_has_only_samplers_that_tick() -> None:
 
 @pytest.mark.parametrize("delay", [0, 3, 4])
 def test_an_index_may_follow_from_variables(delay: int) -> None:
-    """A register whose start is that of an input, and the element that a parameter names."""
+    """A register that starts with an input's value, and the element that a parameter names."""
     with initializing(made(DELAY)) as unit:
         integers = [unit.loaded.references[name] for name in ("delay", "at")]
         unit.fmi.setInteger(integers[:1], [delay])

@@ -38,7 +38,7 @@ def refusal(fmu: Path, stop: float, **start: float) -> str:
 def test_a_message_names_what_the_file_names(
     fmu: Path, version: str, method: str, given: dict, said: str, numbers: list[float]
 ) -> None:
-    """Its time is that of the simulation, which begins at 10 s."""
+    """It names the time of the simulation, which begins at 10 s."""
     expected = re.escape(said).replace("<number>", NUMBER)
     start = {"solver_method": method} | given
     message = refusal(fmu.parent / version / fmu.name, START + 10 * STEP, **start)

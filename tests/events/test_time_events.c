@@ -1,5 +1,5 @@
 /* Time events: a hammer strikes a mass at given times, with each method. The motion between two
- * strokes is that of a constant force. */
+ * strokes follows a constant force. */
 #include "each_method.h"
 #include "toy_run.h"
 

@@ -92,7 +92,7 @@ def test_the_filter_knows_how_wrong_it_is(controlled: tuple[np.ndarray, ...]) ->
 
 
 def test_the_filter_settles_at_the_riccati_equation() -> None:
-    """At the goal its covariance is that of the stationary filter of python-control."""
+    """At the goal it has the covariance of python-control's stationary filter."""
     model = lqr_and_kalman.Arm()
     model.set(lqr_and_kalman.STATES, lqr_and_kalman.GOAL)
     holding = model.get(("gravity1", "gravity2"))

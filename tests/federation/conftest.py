@@ -1,4 +1,4 @@
-"""What these tests share, and their end, that of the command: HELICS's own may wait for ever."""
+"""What these tests share. They end as the command does: HELICS may wait for ever at its end."""
 
 import os
 import sys

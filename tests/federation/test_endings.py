@@ -61,9 +61,9 @@ def gone(children: list[psutil.Process]) -> bool:
         (
             SSP,
             "heavy_payload",
-            "its variant is 'heavy_payload', that of the federation is 'nominal'",
+            "its variant is 'heavy_payload', the federation's is 'nominal'",
         ),
-        (None, "nominal", "its file is not that of the federation"),
+        (None, "nominal", "its file is not the federation's"),
     ],
 )
 def test_something_else_elsewhere_is_refused_by_both(
@@ -216,7 +216,7 @@ def test_what_helics_writes_as_it_ends_is_nobodys_message() -> None:
 
 
 def test_signals_come_to_the_thread_that_watches() -> None:
-    """HELICS's threads begin in that of the work, and would be interrupted."""
+    """HELICS starts its threads in the thread of the work: signals would interrupt them."""
     blocked = component.run_watched(
         lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()), lambda: None, lambda _: None
     )

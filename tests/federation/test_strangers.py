@@ -68,7 +68,7 @@ def test_a_federation_has_one_port_on_loopback(start: Start) -> None:
             found += [
                 connection.laddr.ip
                 for connection in process.net_connections(kind="inet")
-                if connection.status in (psutil.CONN_LISTEN, psutil.CONN_NONE)  # that of UDP
+                if connection.status in (psutil.CONN_LISTEN, psutil.CONN_NONE)  # of UDP
             ]
     assert found == ["127.0.0.1"]
 

@@ -81,7 +81,7 @@ static void test_unknown_categories_are_named(void) {
 
 /* ---- On and off ----------------------------------------------------------------------------- */
 
-/* Off, it still says what failed; each category is that of the status. */
+/* Off, it still says what failed; each category fits the status. */
 static void test_logging_on_tells_events(void) {
     for (int on = 0; on < 2; on++) {
         const fmi2Component c = fmu_instantiate(&messages, on);

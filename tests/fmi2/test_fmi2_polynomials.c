@@ -165,7 +165,7 @@ static void test_what_is_not_refreshed_no_longer_applies(void) {
     assert_slid(c, &slope, 0.25, q2, dq2);
 }
 
-/* A derivative of one input does not keep that of the other. */
+/* A derivative of one input does not keep the other one's. */
 static void test_inputs_are_refreshed_one_by_one(void) {
     const fmi2Component c = sliding(0.0);
     ASSERT_OK(derive(c, RP_MANIPULATOR_f2, 1, 4.0));

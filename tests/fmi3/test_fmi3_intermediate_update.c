@@ -210,7 +210,7 @@ EACH_METHOD static void test_outputs_follow_moving_inputs(void) {
 
 struct request {
     unsigned at_update; /* counted from 1 */
-    double after;       /* s: the time asked for comes after that of the update by this */
+    double after;       /* s: from the time of the update to the time asked for */
     double time;        /* s: that was asked for */
     unsigned could;     /* updates in which it was allowed */
     unsigned could_not;

@@ -340,7 +340,7 @@ static void assert_same_bytes(struct fuzz_instance *expected, struct fuzz_instan
     fuzz_serialize(expected, &bytes[0]);
     fuzz_serialize(actual, &bytes[1]);
     if (!fuzz_are_same_bytes(&bytes[0], &bytes[1])) {
-        fuzz_fail("%s differs from that of a new instance", what);
+        fuzz_fail("%s differs from a new instance's", what);
     }
 }
 

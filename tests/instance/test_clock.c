@@ -69,7 +69,7 @@ static void test_the_drift_of_a_step_is_at_least_its_mismatch(void) {
     TEST_ASSERT_TRUE(clock_step_drift(1024.0, 0.0) == 0x1p-43);
 }
 
-/* Of two times that are the same double, the difference is that of what rounding left over. */
+/* Two times that are the same double differ by what rounding left over. */
 static void test_rests_count_with_their_signs(void) {
     const struct clock_time later = {.s = 1.0, .rest = 3e-17};
     const struct clock_time earlier = {.s = 1.0, .rest = -2e-17};

@@ -170,7 +170,7 @@ static void test_a_wrong_one_shows_in_the_evaluations(void) {
     TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(no_jacobian));
 }
 
-/* The Jacobian is that of its own time: inputs are evaluated there, not where the right-hand side
+/* The Jacobian belongs to its own time: inputs are evaluated there, not where the right-hand side
  * was asked for last. */
 static void test_inputs_are_those_of_the_jacobians_time(void) {
     begin(INTEGRATOR_CVODE_BDF, 3.0, 0.5);

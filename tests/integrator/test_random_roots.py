@@ -28,7 +28,7 @@ class Exact:
         return cls(tuple(above * (common // below) for above, below in ratios))
 
     def __call__(self, s: float) -> int:
-        """Value at a double times a power of 2: its sign is that of the polynomial."""
+        """Value at a double times a power of 2: it has the polynomial's sign."""
         above, below = s.as_integer_ratio()
         value, scale = 0, 1
         for c in reversed(self.c):
@@ -84,7 +84,7 @@ def isolate(p: Exact, deepest: int = 120) -> list[tuple[float, float]]:
     """Intervals with one root each, in their order: open ones, or the root twice.
 
     Vincent, Collins and Akritas: halves are halved until Descartes' rule leaves one root or none.
-    An interval of width 2^-deepest counts as a root, too: that of a multiple one.
+    An interval of width 2^-deepest counts as a root, too, of a multiple one.
     """
     found = []
     c = list(p.c)

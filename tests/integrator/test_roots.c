@@ -232,7 +232,7 @@ static void test_value_and_slope(void) {
     TEST_ASSERT_EQUAL_DOUBLE(10 * 0x1p-53 * 4.625, at.rounding);
 }
 
-/* Also that of coefficients that have been rounded; and it is not much larger than the error. */
+/* Also the error of rounded coefficients; the bound is not much larger. */
 static void test_rounding_bounds_the_error(void) {
     for (int degree = 1; degree <= MOST; degree++) {
         double c[MOST + 1];

@@ -156,7 +156,7 @@ static void check_arrays(void) {
     }
 }
 
-/* The terms of a linear combination, as coefficients of a polynomial, that of s^4 first. */
+/* The terms of a linear combination, as coefficients of a polynomial, of s^4 first. */
 static void check_polynomial(void) {
     sunrealtype powers[COUNT];
     struct small_vector_terms terms = {0};

@@ -158,7 +158,7 @@ W = 60.0  # rad/s
 MODE = [1.0, 2 * 0.001 * W, W**2]
 FAINT = [1.0, 2 * 0.0001 * W, W**2]
 LAG = product([1.0, 0.0], [1 / 500, 1.0])
-LOOPS_BY_NAME = {  # a mode adds its answer to that of a rigid body
+LOOPS_BY_NAME = {  # a mode adds its answer to a rigid body's
     "mode of damping 0.001": (0.9 * np.polyadd(MODE, [0.2 * W, 0]), product(LAG, MODE)),
     "mode that turns": (0.9 * np.polyadd(FAINT, [0.00945 * W**2]), product(LAG, FAINT)),
     "slow zero": ([3.9e-4, 3.9e-5], [1.0, 2e-4, 1.0, 0.0]),

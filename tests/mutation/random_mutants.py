@@ -213,7 +213,7 @@ class Workshop:
         return self.builds[kind]
 
     def judge(self, mutant: Mutant) -> str:
-        """Verdict on a mutant: that of the tests without sanitizers, then of those with."""
+        """Verdict on a mutant: by the tests without sanitizers, then by those with."""
         for kind in LIMITS:
             build = self.build(kind)
             with self.broken(mutant):

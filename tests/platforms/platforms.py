@@ -189,7 +189,7 @@ class Runner:
     ) -> None:
         """`fmu` is the native one; `folder` takes libraries and transcripts.
 
-        `archive` has the library of the row: that of the release if it is not given.
+        `archive` has the library of the row; without it the release has.
         """
         self.row = row
         self.name = row.name if row else "native"

@@ -112,7 +112,7 @@ STOPS = CONTENT.replace('"erk"', '"cvode_adams"').replace(
 
 
 def test_a_run_that_fails_is_in_the_report(console: Console, browser: Browser) -> None:
-    """Its page replaces that of an earlier run, and the files after it still run."""
+    """Its page replaces the page of an earlier run, and the files after it still run."""
     Path("a.toml").write_text(CONTENT, encoding="utf-8")
     assert console("run", "a.toml", "--report", "out")[0] == 0
     Path("a.toml").write_text(STOPS, encoding="utf-8")
@@ -168,7 +168,7 @@ def test_two_files_of_one_name_are_refused(console: Console) -> None:
         Path(name).mkdir()
         Path(name, "x.toml").write_text(CONTENT, encoding="utf-8")
     error = console.refused("run", "a/x.toml", "b/x.toml", "--report", "out")
-    assert "b/x.toml: its page would have the name of that of a/x.toml" in error
+    assert "b/x.toml: its page would have the same name as the page of a/x.toml" in error
 
 
 def test_capitals_of_a_suffix_do_not_matter(console: Console) -> None:

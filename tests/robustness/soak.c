@@ -153,7 +153,7 @@ static void step_on(unsigned long cycle) {
     (void)(i % 10 == 0 ? step_again(*c, i, i % 100 == 0) : step(*c, i));
 }
 
-static const char *paths[3]; /* that of this build's FMU first */
+static const char *paths[3]; /* this build's FMU first */
 
 /* As importers do: load, instantiate, a few steps, free, unload. Two other FMUs are loaded
  * meanwhile and unloaded in the same order. */

@@ -319,7 +319,7 @@ def test_what_an_ssp_refers_to_lies_inside(tmp_path: Path, source: str) -> None:
 
 
 def test_a_variant_is_no_path(tmp_path: Path) -> None:
-    """Its name becomes that of files which are written and removed."""
+    """Files that are written and removed get its name."""
     rename = replace('name="nominal"', 'name="../../x"')
     edits = {
         f"resources/{component}_nominal.ssv": rename

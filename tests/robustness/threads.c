@@ -1,5 +1,5 @@
 /* Many threads with many instances each, which step, save, restore, serialize and move to new
- * instances in between. Every value after every step must have the same bits as that of one
+ * instances in between. Every value after every step must have the same bits as in one
  * instance alone in one thread. Run with ThreadSanitizer too: preset tsan. */
 #include "fmu_harness.h"
 

@@ -312,7 +312,7 @@ def test_a_sample_that_is_not_finite_is_refused(
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_an_effort_at_its_limit_counts_as_beyond(loaded: LoadedFmu, side: float) -> None:
-    """Its derivative is that of the limit, exactly there, too, and inputs move it at once."""
+    """It has the limit's derivative exactly there, too, and inputs move it at once."""
     with Instance(loaded) as instance:
         instance.fmi.setInteger([loaded.references["mode"]], [PD])
         instance.initialize(**GAINS, q1_ref=0.5 * side, tau1_max=18.75, integral1=0.0)

@@ -123,7 +123,7 @@ def test_the_tip_is_where_the_plant_has_its_payload(loaded: LoadedFmu, path: Pat
 
 
 def test_power_of_the_wrench_is_what_the_plant_receives(loaded: LoadedFmu, path: Path) -> None:
-    """The rate of the arm's energy under the wrench is that of the force at the tip."""
+    """The wrench changes the arm's energy as the force at the tip does."""
     plant = LoadedFmu(path.with_name("RPPlant.fmu"), loaded.folder / "driven")
     rate = ["ddq1", "ddq2"]
     for seed in range(5):

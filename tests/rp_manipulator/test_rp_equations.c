@@ -151,7 +151,7 @@ static void test_mass_matrix_rate_less_twice_coriolis_is_skew(void) {
                 N[i][j] = rate - 2.0 * C[i][j];
             }
         }
-        /* 2.1 times the rounding of D by the step 1/4, and that of C */
+        /* 2.1 times the rounding of D by the step 1/4, and the rounding of C */
         double bound = 64 * EPS * d11_scale(fabs(s.q[1]) + fabs(s.dq[1]));
         bound += 8 * EPS * p.m2 * longest_L(s.q[1]) * (fabs(s.dq[0]) + fabs(s.dq[1]));
         ASSERT_CLOSE(0.0, N[0][0], bound);

@@ -12,7 +12,7 @@
 static const double pi = 3.14159265358979323846;
 static struct rp_trajectory_parameters p;
 
-/* All parameters have a value, though only those of one motion count. The circle is that of the
+/* All parameters have a value, though only those of one motion count. The circle has the
  * start values of rp_trajectory.toml, beside the axis of joint 1. */
 static const struct rp_trajectory_parameters example = {
     .motion = RP_TRAJECTORY_MOTION_CIRCLE,

@@ -1,4 +1,4 @@
-// An FMU that does nothing but go wrong: every Real variable is 0, but that of value
+// An FMU that does nothing but go wrong: every Real variable is 0, but the one of value
 // reference BROKEN, which is NaN after STEPS steps. Takes the place of any FMU's shared object.
 #include <math.h>
 #include <stdlib.h>

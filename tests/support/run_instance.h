@@ -36,7 +36,7 @@ static inline void set_integer(unsigned reference, int value) {
     ASSERT_OK(instance_set_integer(instance, &reference, 1, &value));
 }
 
-/* From the time 0; tolerance 0: that of the model. */
+/* From the time 0; tolerance 0: the model's. */
 static inline void initialize(double tolerance) {
     const struct instance_experiment experiment = {.tolerance_defined = tolerance > 0.0,
                                                    .tolerance = tolerance};

@@ -2,7 +2,7 @@
 
     build/venv/bin/python -m tests.support.times [--readme]
 
---readme puts it into tests/README.md: that of ./test.sh --all under "Where the time goes", that of
+--readme puts it into tests/README.md: after ./test.sh --all under "Where the time goes", after
 ./test.sh --long with its figures under "The last long run".
 """
 
@@ -27,7 +27,7 @@ GROUPS = {
     r"((?:long|analysis)_.*)": r"\1",
     r".*": "C",
 }
-# of the rows, that of the tests in a file of ctest
+# of the rows: the tests in a file of ctest
 FILES = {
     "tests: sanitizers, C": "asan",
     "tests: all but those that --all adds": "default",

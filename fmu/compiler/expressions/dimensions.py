@@ -1,8 +1,8 @@
 """Dimensions of expressions: every sum, comparison and argument of a function has to fit.
 
 A dimension is the exponents of the SI base units; rad counts as 1. A number without a name takes
-that of what it is added to, compared with or assigned to; in products it is 1. Messages call it a
-unit.
+the dimension of what it is added to, compared with or assigned to; in products it is 1. Messages
+call it a unit.
 """
 
 from collections.abc import Mapping

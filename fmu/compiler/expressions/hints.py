@@ -11,13 +11,13 @@ HERE += " fix=floor fmod=mod rem=mod derivative=der ddt=der diff=der"
 HERE += " arcsin=asin arccos=acos arctan=atan arctan2=atan2"
 INSTEAD = dict(pair.replace("_", " ").split("=") for pair in HERE.split())
 SIGNS = {"^": "powers are written **", "?": "write A if C else B", "&": "write and"}
-SIGNS |= {"|": "write or", "!": "write not", "%": "write mod(x, y), whose sign is that of y"}
+SIGNS |= {"|": "write or", "!": "write not", "%": "write mod(x, y), which has the sign of y"}
 SIGNS |= dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "no minus sign of ASCII, write -")
 # of those that differ
 ROUNDS_DOWN = ", which rounds down (ceil rounds negative numbers towards 0)"
 NOTES = dict.fromkeys(("int", "trunc", "fix"), ROUNDS_DOWN)
 NOTES |= dict.fromkeys(
-    ("fmod", "rem"), ", whose sign is that of the second argument, not the first"
+    ("fmod", "rem"), ", which has the sign of the second argument, not the first"
 )
 
 

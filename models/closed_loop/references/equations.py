@@ -1,6 +1,6 @@
 """Equations of the closed loop in sympy, from positions and paths; nothing of the C code goes in.
 
-The arm's motion is that of models/rp_manipulator/references/make_references.py: Euler-Lagrange,
+The arm moves as in models/rp_manipulator/references/make_references.py: Euler-Lagrange,
 from the positions of both centers of mass. The controller's inverse dynamics come from the same
 Lagrangian with the controller's parameters. The reference is a path in the plane or in joint space,
 an exact function of time, differentiated by sympy. Symbols are named like the variables, with the

@@ -1,8 +1,8 @@
 """Makes the references of the closed loop, without the code that they check.
 
-For every variant ``monolithic.csv``, the solution in continuous time; ``sampled.csv``, that of the
-system stepped in Jacobi order, read before inputs are set; ``ecos.csv``, the same read after inputs
-are set, as Ecos does. closed_loop.py says what they mean, equations.py where they come from.
+For every variant ``monolithic.csv``, the solution in continuous time; ``sampled.csv``, the solution
+of the system stepped in Jacobi order, read before inputs are set; ``ecos.csv``, the same read after
+inputs are set, as Ecos does. closed_loop.py says what they mean, equations.py where they come from.
 """
 
 from collections.abc import Mapping

@@ -2,7 +2,7 @@
 
 Parameters are named like the system's variables, ``plant.m2``; one that is not given has the start
 value that the model's FMU declares. The plant is solved by heyoka from event to event, as in
-models/rp_plant/references; the motion of reference is that of models/closed_loop/references.
+models/rp_plant/references; the reference motion is taken from models/closed_loop/references.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,6 +1,6 @@
 """The machine in continuous time: one differential equation of arm, motors and controller.
 
-The controller's law is that of its continuous form and reads the joints themselves; nothing is
+The controller has its continuous form and reads the joints themselves; nothing is
 sampled, counted, held or late. The motion is smooth between the corners of the reference motion and
 the times of grasp and release, and heyoka starts again at each of them. The arm and what the
 controller knows of it come from the Lagrangian of models/rp_plant/references, the reference motion

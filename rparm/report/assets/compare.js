@@ -37,7 +37,7 @@ const Compare = (() => {
       const wrong = (what) => new Refused(`line ${i + 1}: ${what}`);
       if (row.length !== names.length) throw wrong(`expected ${names.length} values, found ${row.length}`);
       if (!row.every(Number.isFinite)) throw wrong('expected numbers with a decimal point');
-      if (rows.length && !(row[time] > rows.at(-1)[time])) throw wrong('its time is not after that of the row before');
+      if (rows.length && !(row[time] > rows.at(-1)[time])) throw wrong('its time is not after the time of the row before');
       rows.push(row);
     });
     if (!rows.length) throw new Refused('has no rows below the names of its columns');

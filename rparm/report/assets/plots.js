@@ -194,7 +194,7 @@ const Plots = (() => {
     modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'],
   };
 
-  /** Colour of another result: that of its curve, and where there is only one, another one. */
+  /** Colour of another result: its curve's, or another one where there is only one curve. */
   function otherColour(plot, i, palette) {
     return palette.curves[plot.curves.length > 1 ? i % COLOURS : 1];
   }
@@ -371,7 +371,7 @@ const Plots = (() => {
       this.show(0);
     }
 
-    /** The player's slider is that of the page; its values stand with those of the plots. */
+    /** The player has the page's slider; its values stand with those of the plots. */
     addPlayer(element) {
       if (!element) return;
       this.player = new Player(element, this.data.motion);
