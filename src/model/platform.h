@@ -25,6 +25,7 @@
 
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
 #define NOINLINE      __attribute__((noinline))
+#define MAYBE_UNUSED  __attribute__((unused))
 /* Stands in front of a function whose code is to be small rather than fast. */
 #if defined(__clang__)
 #define SELDOM_CALLED __attribute__((cold, minsize))
@@ -84,6 +85,7 @@ struct pair {
 #define PRINTF_FORMAT(format_, first)
 #define ALWAYS_INLINE static inline
 #define NOINLINE
+#define MAYBE_UNUSED
 #define SELDOM_CALLED
 #define INDEPENDENT_ITERATIONS
 #define HIDE_SYMBOLS

@@ -20,6 +20,7 @@ from tests.equations.compiled import (
     read_text,
 )
 from tests.equations.examples import MISTAKES, MODELS
+from tests.support.paths import ROOT
 from tests.support.tables import cases
 
 import equations_to_fmu  # isort: skip; compiled.py knows where it is
@@ -81,6 +82,20 @@ def test_values_are_those_of_compiled_c(tmp_path: Path) -> None:
             (above, below) = (np.array([x, y]) + s * np.array(direction) for s in (h, -h))
             slope = (c("mixed", *above) - c("mixed", *below)) / (2 * h)
             assert first[model.names.index("d_x")] == pytest.approx(slope, rel=1e-8, abs=1e-9)
+
+
+def test_where_c_decides_without_an_event_there_is_no_series(tmp_path: Path) -> None:
+    code = '#include "real.h"\nreal f(real x) { return value_of(x) > 1.0 ? x : 2.0 * x; }\n'
+    (tmp_path / "real.h").write_bytes((ROOT / "models" / "real.h").read_bytes())
+    head = 'name = "M"\ncode = "f.c"\n[states]\n'
+    path = files(tmp_path, f'{head}x = {{ start = 3, derivative = "-f(x)" }}\n', code)
+    model = Model(tmp_path, path.read_text(encoding="utf-8"))  # compiled with all warnings
+    assert not model.words.series and not model.words.events
+    for x, rate, slope in ((3.0, -3.0, -1.0), (0.5, -1.0, -2.0)):
+        values = model.values(x=x)
+        model.outputs(values, 0.0)
+        assert values[model.names.index("d_x")] == rate
+        assert model.jacobian(values, 0.0).tolist() == [[slope]]
 
 
 def test_functions_without_slope_are_found_where_they_are_called(tmp_path: Path) -> None:
