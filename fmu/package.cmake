@@ -1,10 +1,10 @@
 # add_fmu(NAME FOLDER models/... LIBRARY target [REFERENCES scenario ...] [VERSIONS fmi2 fmi3])
-# add_fmu(NAME EQUATIONS file.toml [FOLDER models/...] ...)
+# add_fmu(NAME EQUATIONS file.toml [FOLDER models/...] [LIBRARY target] ...)
 #
 # Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or the one of them that
 # VERSIONS names, from the model's folder (variables.toml, README.md; model.png and pictures of the README
 # where there are any) and the library that defines its struct model. EQUATIONS: a file with equations in place of
-# both, with its lock file; the folder may have a page and pictures. The archive carries inputs and
+# both, with its lock file; the folder may have a page and pictures, and the library then has the C of its hook. The archive carries inputs and
 # references of the scenarios after REFERENCES. Targets:
 #   NAME_equations             the library with the struct model of EQUATIONS
 #   NAME, NAME_fmi3            the shared objects
@@ -121,6 +121,10 @@ function(add_fmu name)
       set(readme ${folder}/README.md)
     endif()
     add_equations(${name} ${ARG_EQUATIONS} ${out}/model)
+    if(ARG_LIBRARY) # each calls the other
+      target_link_libraries(${name}_equations PUBLIC ${ARG_LIBRARY})
+      target_link_libraries(${ARG_LIBRARY} INTERFACE ${name}_equations)
+    endif()
     set(ARG_LIBRARY ${name}_equations)
     set(variables ${out}/model/variables.toml)
     if(icon) # the generator looks for it beside variables.toml

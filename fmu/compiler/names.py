@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import groupby
 
 OF_VALUES = "_values.h"  # behind the stem of a file: the header that is made of it
@@ -54,3 +54,28 @@ class Fields:
     def rate(self, name: str) -> Field:
         """The derivative of a state."""
         return self._of("d", name)
+
+
+class StructFields:
+    """Names in C of variables in the struct of values of a header."""
+
+    def __init__(self, places: Mapping[tuple[str | int, ...], str], rates: str, states: list[str]):
+        self.places: dict[str, Field] = {}
+        for place, name in places.items():
+            names = ".".join(part for part in place if isinstance(part, str))
+            indexes = [part for part in place if isinstance(part, int)]
+            base = names + "".join(f"[{i}]" for i in indexes[:-1])
+            self.places[name] = Field(base, indexes[-1] if indexes else None)
+        self.rates = {name: Field(rates, i) for i, name in enumerate(states)}
+
+    def value(self, name: str) -> Field:
+        """A number."""
+        return self.places[name]
+
+    def count(self, name: str) -> Field:
+        """A condition, whole number or enumeration."""
+        return self.places[name]
+
+    def rate(self, name: str) -> Field:
+        """The derivative of a state."""
+        return self.rates[name]

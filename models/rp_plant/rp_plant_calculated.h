@@ -1,9 +1,8 @@
-/* The calculated fields of struct rp_plant_values. */
+/* What RPPlant calculates of its parameters, inputs, states and modes. */
 #pragma once
 
+#include "../rp_manipulator/rp_recursion.h"
 #include "rp_plant_equations.h"
-#include "rp_plant_model.h"
-#include "rp_recursion.h"
 
 /* ---- Loads of the joints --------------------------------------------------------------------
  *
@@ -58,22 +57,31 @@ static inline void plant_end_effector_acceleration(const struct arm *hand, const
     acceleration[1] = along_z1 * hand->s1 + along_x1 * hand->c1;
 }
 
-static inline void write_end_effector(const struct arm *hand, struct rp_plant_values *values) {
-    arm_end_effector_position(hand, values->ee_position);
-    arm_end_effector_velocity(hand, values->ee_velocity);
-    plant_end_effector_acceleration(hand, values->ddq, values->ee_acceleration);
+static inline void write_end_effector(const struct arm *hand, const real ddq[2],
+                                      struct rp_plant_values *values) {
+    real position[2];
+    real velocity[2];
+    real acceleration[2];
+    arm_end_effector_position(hand, position);
+    arm_end_effector_velocity(hand, velocity);
+    plant_end_effector_acceleration(hand, ddq, acceleration);
+    values->ee_x = position[0];
+    values->ee_y = position[1];
+    values->ee_vx = velocity[0];
+    values->ee_vy = velocity[1];
+    values->ee_ax = acceleration[0];
+    values->ee_ay = acceleration[1];
     values->ee_angle = hand->q[0];
     values->ee_rate = hand->dq[0];
 }
 
-static inline void write_energies(const struct plant *plant, const struct rp_plant_modes *modes,
-                                  struct rp_plant_values *values) {
+static inline void write_energies(const struct plant *plant, struct rp_plant_values *values) {
     const struct rp_plant_parameters *p = &values->parameters;
     const real *tau = values->inputs.tau;
     real potential_energy = arm_potential_energy(&plant->arm);
     for (int i = 0; i < 2; i++) {
-        if (modes->contact[i] != RP_PLANT_APART) {
-            potential_energy += plant_stop_energy(p, modes->contact[i], i, values->q[i]);
+        if (values->modes.contact[i] != RP_PLANT_APART) {
+            potential_energy += plant_stop_energy(p, values->modes.contact[i], i, values->q[i]);
         }
     }
     values->kinetic_energy = plant_kinetic_energy(plant);
@@ -82,16 +90,30 @@ static inline void write_energies(const struct plant *plant, const struct rp_pla
     values->actuator_power = tau[0] * values->dq[0] + tau[1] * values->dq[1];
 }
 
+static inline void write_terms(const struct plant *plant, struct rp_plant_values *values) {
+    real D[2][2];
+    real coriolis[2];
+    plant_mass_matrix(plant, D);
+    arm_coriolis_forces(&plant->arm, coriolis);
+    arm_gravity_forces(&plant->arm, values->gravity);
+    values->D[0][0] = D[0][0];
+    values->D[0][1] = D[0][1];
+    values->D[1][1] = D[1][1];
+    values->coriolis1 = coriolis[0];
+    values->coriolis2 = coriolis[1];
+}
+
 /* Writes friction and stops with their power and indicators. driven: as in plant_loads. */
-static inline void write_joints(const struct rp_plant_modes *modes, const real reaction[2],
+static inline void write_joints(const real ddq[2], const real reaction[2],
                                 struct rp_plant_values *values, real driven[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
+    const struct rp_plant_modes *modes = &values->modes;
     real power = 0.0;
     for (int i = 0; i < 2; i++) {
         const real q = values->q[i], dq = values->dq[i];
         const struct plant_hold hold = plant_hold(p, modes, i, q, dq, reaction[i]);
         const real damped = p->damping[i] * dq;
-        const real accelerated = p->armature[i] * values->ddq[i];
+        const real accelerated = p->armature[i] * ddq[i];
         driven[i] = values->inputs.tau[i] - damped - (hold.friction - hold.stop) - accelerated;
         power += (hold.friction + damped) * dq;
         values->friction[i] = hold.friction;
@@ -106,37 +128,37 @@ static inline void write_joints(const struct rp_plant_modes *modes, const real r
     values->friction_power = power;
 }
 
-/* Writes the calculated fields from the parameters, inputs and states. modes: in effect; values has
- * them only after initialization. */
-static inline void rp_plant_calculate(struct rp_plant_values *values,
-                                      const struct rp_plant_modes *modes) {
+static inline void write_loads_of_joints(const struct plant *plant, const real driven[2],
+                                         const real ddq[2], struct rp_plant_values *values) {
+    const struct joint_loads loads = plant_loads(plant, values->inputs.wrench, driven, ddq);
+    values->f1_x = loads.f1.x;
+    values->f1_z = loads.f1.z;
+    values->tau1_y = loads.tau1.y;
+    values->f2_x = loads.f2.x;
+    values->f2_z = loads.f2.z;
+    values->tau2_y = loads.tau2.y;
+}
+
+/* Writes the fields that have no value in rp_plant.toml. */
+static inline void rp_plant_calculate(struct rp_plant_values *values) {
     const struct rp_plant_parameters *p = &values->parameters;
-    const struct rp_plant_inputs *inputs = &values->inputs;
+    const struct rp_plant_modes *modes = &values->modes;
     const bool attached = modes->payload == RP_PLANT_ATTACHED;
     const struct plant plant = plant_in_state(p, attached, values->q, values->dq);
     real applied[2];
     real efforts[2];
+    real ddq[2];
     real reaction[2];
-    plant_wrench_forces(&plant, inputs->wrench, applied);
-    plant_efforts(&plant, p, modes, inputs->tau, applied, efforts);
-    plant_motion(&plant, modes->joint, efforts, values->ddq, reaction);
+    plant_wrench_forces(&plant, values->inputs.wrench, applied);
+    plant_efforts(&plant, p, modes, values->inputs.tau, applied, efforts);
+    plant_motion(&plant, modes->joint, efforts, ddq, reaction);
+    values->ddq[0] = ddq[0];
+    values->ddq[1] = ddq[1];
 
     real driven[2];
-    write_joints(modes, reaction, values, driven);
-    write_end_effector(&plant.hand, values);
-    write_energies(&plant, modes, values);
-
-    // terms of the equations of motion
-    plant_mass_matrix(&plant, values->D);
-    arm_coriolis_forces(&plant.arm, values->coriolis);
-    arm_gravity_forces(&plant.arm, values->gravity);
-
-    const struct joint_loads loads = plant_loads(&plant, inputs->wrench, driven, values->ddq);
-    write_loads(&loads, &values->loads);
+    write_joints(ddq, reaction, values, driven);
+    write_end_effector(&plant.hand, ddq, values);
+    write_energies(&plant, values);
+    write_terms(&plant, values);
+    write_loads_of_joints(&plant, driven, ddq, values);
 }
-
-/* Derived: first and, unless NULL, second derivatives of the calculated fields along a curve.
- * The other fields of first and second give the curve. The modes are fixed; at a closed
- * stop or a limit of friction, derivatives belong to the side on which the joint is. */
-void rp_plant_derivatives(const struct rp_plant_values *values, const struct rp_plant_modes *modes,
-                          struct rp_plant_values *first, struct rp_plant_values *second);

@@ -5,6 +5,7 @@
 #include "rp_plant_modes.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -163,7 +164,7 @@ static bool take_payload(struct rp_plant_values *values) {
     if (before == mode || before == RP_PLANT_UNDECIDED) {
         return false;
     }
-    if (mode == RP_PLANT_ATTACHED && p->grasp == RP_PLANT_AT_REST) {
+    if (mode == RP_PLANT_ATTACHED && p->grasp == RP_PLANT_GRASP_AT_REST) {
         double dq[2];
         values->sums.grasp_loss += rp_plant_grasp_at_rest(p, values->q, values->dq, dq);
         memcpy(values->dq, dq, sizeof dq);
@@ -280,6 +281,42 @@ static enum status update(void *values_pointer, const struct event *event) {
     }
     rp_plant_begin_contacts(p, values->q, values->dq, &values->inputs, &values->modes);
     return STATUS_OK;
+}
+
+/* A limit that is moved past a joint while it runs takes the joint along; a start outside is a
+ * mistake. */
+bool rp_plant_check(const struct rp_plant_values *values, char *text, size_t size) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    for (int i = 0; i < 2 && values->modes.payload == RP_PLANT_UNDECIDED; i++) {
+        const double q = values->q[i];
+        if (p->stops[i] == RP_PLANT_STOPS_RIGID && !(q >= p->lower[i] && q <= p->upper[i])) {
+            const int joint = i + 1;
+            (void)snprintf(text, size,
+                           "q%d = %.17g is refused: a start must be within lower%d = %.17g and "
+                           "upper%d = %.17g",
+                           joint, q, joint, p->lower[i], joint, p->upper[i]);
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Over steps in which the velocity changes by vs at most, the series shows the friction near rest.
+ * Those of a fast joint, which show nothing of it, end before. */
+static void reach(const void *values_pointer, const double x[], double reach[]) {
+    const double fast = 6.0; // so many times vs, exp(-36) of the difference is left
+    const struct rp_plant_values *values = values_pointer;
+    const struct rp_plant_parameters *p = &values->parameters;
+    for (int i = 0; i < 2; i++) {
+        const bool is_sliding = plant_slides(values->modes.joint[i]);
+        const double vs = p->stribeck_velocity[i];
+        const double above_fast = fabs(x[2 + i]) - fast * vs;
+        reach[i] = INFINITY;
+        reach[2 + i] = INFINITY;
+        if (is_sliding && p->breakaway_friction[i] > p->coulomb_friction[i]) {
+            reach[2 + i] = above_fast > vs ? above_fast : vs;
+        }
+    }
 }
 
 static bool are_possible(const void *values_pointer) {
@@ -406,6 +443,6 @@ const struct model_events rp_plant_events = {
     .is_at_rest = is_at_rest,
     .describe = describe,
     .indicators = indicators,
-    .reach = rp_plant_reach,
+    .reach = reach,
     .update = update,
 };

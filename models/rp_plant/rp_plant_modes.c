@@ -137,6 +137,22 @@ void rp_plant_first_modes(const struct rp_plant_values *values, const double q[2
     rp_plant_begin_contacts(p, q, dq, inputs, modes);
 }
 
+const struct rp_plant_values *rp_plant_in_effect(const struct rp_plant_values *values,
+                                                 const double x[], const double u[],
+                                                 struct rp_plant_values *copy) {
+    struct rp_plant_modes modes;
+    struct rp_plant_inputs inputs;
+    if (rp_plant_modes_are_decided(values, &modes) &&
+        memcmp(&modes, &values->modes, sizeof modes) == 0) {
+        return values;
+    }
+    memcpy(&inputs, u, sizeof inputs);
+    rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
+    *copy = *values;
+    copy->modes = modes;
+    return copy;
+}
+
 /* ---- Held joints ----------------------------------------------------------------------------- */
 
 static bool stays_stuck(const struct rp_plant_values *values, int joint, double most_force) {
@@ -184,6 +200,21 @@ static int side_at_limit(const struct rp_plant_decision *decision, int joint, in
     return -reaction >= rest->breakaway[joint] && rest->closed[joint] <= 0 ? -1 : 0;
 }
 
+/* Writes time derivatives of the reactions of stuck joints along the motion. */
+static void reaction_rates(const struct rp_plant_values *values, const struct event *event,
+                           double rates[2]) {
+    struct rp_plant_values first = {.q = {values->dq[0], values->dq[1]}};
+    struct rp_plant_motion now;
+    rp_plant_motion(&values->parameters, &values->modes, values->q, values->dq, &values->inputs,
+                    &now);
+    memcpy(first.dq, now.ddq, sizeof first.dq);
+    memcpy(&first.inputs, event->du, sizeof first.inputs);
+    (void)rp_plant_model.derivatives(values, event->t, 1.0, &first, NULL);
+    for (int i = 0; i < 2; i++) {
+        rates[i] = first.friction[i] - first.stop_force[i];
+    }
+}
+
 void rp_plant_break_away(struct rp_plant_values *values, const struct event *event,
                          const struct rp_plant_decision *decision, const int leaves[2]) {
     const int side[2] = {side_at_limit(decision, 0, leaves[0]),
@@ -192,11 +223,8 @@ void rp_plant_break_away(struct rp_plant_values *values, const struct event *eve
         return;
     }
     const struct rp_plant_parameters *p = &values->parameters;
-    struct rp_plant_inputs du;
-    memcpy(&du, event->du, sizeof du);
     struct rp_plant_rest next = {.inertia = decision->rest.inertia};
-    rp_plant_reaction_rates(p, &values->modes, values->q, values->dq, &values->inputs, &du,
-                            next.forces);
+    reaction_rates(values, event, next.forces);
     struct rp_plant_outcome outcome = {.reaction = {next.forces[0], next.forces[1]}};
     if (side[0] != 0 && side[1] != 0) {
         for (int i = 0; i < 2; i++) {

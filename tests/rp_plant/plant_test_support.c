@@ -9,14 +9,13 @@ void plant_test_start(struct rp_plant_values *v) {
     memset(v, 0, sizeof *v);
     rp_test_default_parameters(&v->parameters.arm);
     v->parameters.stops[0] = v->parameters.stops[1] = RP_PLANT_STOPS_NONE;
-    v->parameters.grasp = RP_PLANT_KEEP_VELOCITY;
+    v->parameters.grasp = RP_PLANT_GRASP_KEEP_VELOCITY;
 }
 
 void plant_test_random_arm(struct rp_test_random *random, struct rp_plant_values *v) {
     struct rp_test_state state;
     plant_test_start(v);
-    memset(v->ee_position, 0xff, sizeof *v - offsetof(struct rp_plant_values, ee_position));
-    memset(v->ddq, 0xff, sizeof v->ddq);
+    memset(v->D, 0xff, sizeof *v - offsetof(struct rp_plant_values, D));
     rp_test_random_parameters(random, &v->parameters.arm);
     rp_test_random_state(random, &state);
     memcpy(v->inputs.tau, state.tau, sizeof state.tau);
@@ -55,6 +54,7 @@ void plant_test_random_plant(struct rp_test_random *random, struct rp_plant_valu
 
 void plant_test_outputs(struct rp_plant_values *v) {
     TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.outputs(v, 3.0));
+    v->D[1][0] = v->D[0][1];
 }
 
 void plant_test_update_with(struct rp_plant_values *v, const bool *triggered, const double *du) {

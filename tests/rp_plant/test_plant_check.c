@@ -24,7 +24,7 @@ static void assert_refused(const char *expected) {
 static void test_parameters_of_the_arm(void) {
     assert_accepted();
     p->arm.m1 = p->arm.I1z = p->arm.I2z = 0.0;
-    assert_refused("the inertia m1 lc1^2 + I1z + I2z = 0 is refused: it must be above 0 "
+    assert_refused("the inertia m1 lc1^2 + I1z + I2z is refused: it must be above 0 "
                    "(m1 = 0, lc1 = 0.25, I1z = 0, I2z = 0)");
 }
 

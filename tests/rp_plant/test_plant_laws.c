@@ -322,7 +322,7 @@ static void test_joints_that_surely_hold_stay(void) {
 static void test_a_grasp_at_rest_keeps_the_momenta_of_the_joints(void) {
     for (int n = 0; n < SAMPLES / 2; n++) {
         plant_test_random_plant(&random_source, &v);
-        v.parameters.grasp = RP_PLANT_AT_REST;
+        v.parameters.grasp = RP_PLANT_GRASP_AT_REST;
         v.modes.payload = RP_PLANT_RELEASED;
         v.payload_attached = 0;
         plant_test_outputs(&v);
@@ -354,9 +354,9 @@ static void test_where_velocities_stay(void) {
     const struct {
         int grasp, mode;
         double added; /* kg */
-    } cases[] = {{RP_PLANT_KEEP_VELOCITY, RP_PLANT_RELEASED, 0.0},
-                 {RP_PLANT_AT_REST, RP_PLANT_UNDECIDED, 0.0},
-                 {RP_PLANT_AT_REST, RP_PLANT_ATTACHED, 2.0}};
+    } cases[] = {{RP_PLANT_GRASP_KEEP_VELOCITY, RP_PLANT_RELEASED, 0.0},
+                 {RP_PLANT_GRASP_AT_REST, RP_PLANT_UNDECIDED, 0.0},
+                 {RP_PLANT_GRASP_AT_REST, RP_PLANT_ATTACHED, 2.0}};
     for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         plant_test_random_plant(&random_source, &v);
         v.parameters.grasp = cases[n].grasp;

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { MAX_ROWS = 64 };
+enum { MAX_ROWS = 128 };
 
 typedef double row[SERIES_LENGTH];
 
@@ -29,13 +29,13 @@ static void expand(int last, row all[MAX_ROWS]) {
         .time_scale = time_scale,
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
     };
-    TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, rp_plant_series.row_count);
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, rp_plant_model.series->row_count);
     memset(all, 0xff, sizeof(row) * MAX_ROWS); // NaN: what is read has been written
     for (int i = 0; i < 2; i++) {
         all[i][0] = plant.q[i];
         all[2 + i][0] = plant.dq[i];
     }
-    ASSERT_OK(rp_plant_series.extend(&origin, 0, last, all));
+    ASSERT_OK(rp_plant_model.series->extend(&origin, 0, last, all));
 }
 
 /* ---- First orders --------------------------------------------------------------------------- */
@@ -61,7 +61,7 @@ static void assert_first_orders(void) {
     }
     for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
         if (kinds[i].kind == INDICATOR_OF_MODEL) {
-            const double found = rows[rp_plant_series.row_of_indicator[i]][0];
+            const double found = rows[rp_plant_model.series->row_of_indicator[i]][0];
             ASSERT_CLOSE(z[i], found, 1e-12 * (100.0 + fabs(z[i])));
         }
     }
@@ -91,7 +91,7 @@ static void test_the_first_orders_are_those_of_the_model(void) {
 static void assert_reach(double expected, double dq2) {
     double reach[PLANT_STATES];
     const double x[PLANT_STATES] = {1.0, 2.0, 3.0, dq2};
-    rp_plant_reach(&plant, x, reach);
+    rp_plant_model.events->reach(&plant, x, reach);
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_TRUE(reach[i] == INFINITY);
     }

@@ -9,7 +9,8 @@ FMI_HEADERS = Path(importlib.util.find_spec("fmpy").origin).parent / "c-code"
 
 _TEXT = (ROOT / "CMakeLists.txt").read_text()
 _FMU = re.compile(
-    r"^add_fmu\((\w+) FOLDER models/(\w+) (?:LIBRARY|EQUATIONS) \S+?(?:\s+REFERENCES ([\w ]+))?\)",
+    r"^add_fmu\((\w+) FOLDER models/(\w+) EQUATIONS \S+?(?:\s+LIBRARY \w+)?"
+    r"(?:\s+REFERENCES ([\w ]+))?\)",
     re.M,
 )
 _DECLARED = _FMU.findall(_TEXT)

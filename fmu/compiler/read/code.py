@@ -106,11 +106,12 @@ class Calls(Interpreter):
 
     most_steps = MOST_STEPS
 
-    def __init__(self, program: Program, graph: Graph) -> None:
+    def __init__(self, program: Program, graph: Graph, is_exact: bool = True) -> None:
         self.warnings: list[str] = []
-        super().__init__(program, graph, warn=self.warnings.append)
+        super().__init__(program, graph, is_exact=is_exact, warn=self.warnings.append)
         self.known = ARGUMENTS | (OF_REAL if "real" in program.typedefs else {})
-        self.conditions.decided = graph.choice
+        if is_exact:
+            self.conditions.decided = graph.choice
         self.results: dict[tuple[object, ...], Value] = {}
         self.is_instant, self.steps_in_all = False, 0
         self.flat: dict[str, set[str]] = {}

@@ -32,6 +32,7 @@ WRITTEN = {  # where files have them
 }
 BOOLEAN, INTEGER = "Boolean", "Integer"
 FIXED, DISCRETE = "fixed", "discrete"  # variabilities: of parameters, and of what follows
+MOST_NUMBERS = 16  # that a whole number may be, for conditions to be resolved
 MOST_OPERATIONS = 1_000_000  # of all expressions
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
@@ -94,6 +95,7 @@ class Variable:
     variability: str = ""  # "fixed" or "discrete" if the file says so
     causality: str = ""  # "local" of a state that is no output
     shown: bool = True  # the FMU has it as a variable
+    field: str = ""  # where the C of the file has it, if not by its name
     expression: Expression | None = None  # derivative of a state, value of others
     initial: Expression | None = None  # start value that follows from parameters and inputs
     leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable
@@ -103,6 +105,15 @@ class Variable:
     def value(self) -> Any:
         """What the expression calculates."""
         return self.expression.value
+
+    @property
+    def numbers(self) -> tuple[int, ...] | None:
+        """What a whole number or an enumeration may be, if that is little."""
+        if isinstance(self.kind, tuple):
+            return tuple(range(1, 1 + len(self.kind)))
+        if self.min is None or self.max is None or self.max - self.min >= MOST_NUMBERS:
+            return None
+        return tuple(range(int(self.min), int(self.max) + 1))
 
     @property
     def place(self) -> str:
@@ -166,6 +177,16 @@ class Sampler(Change):
         return [self.every, self.offset]
 
 
+@dataclass(frozen=True)
+class Hook:
+    """Events that C by hand decides, NAME_events; it sets all discrete variables."""
+
+    sources: list[str]  # C files, from the folder of the file
+    indicators: list[str]  # variables, in the order of NAME_events
+    series: list[str]  # those that may be of the model, not of a state
+    reads: dict[str, list[str]]  # what discrete variables follow from between events, too
+
+
 @dataclass
 class ModelFile:
     """All that the file says."""
@@ -182,6 +203,7 @@ class ModelFile:
     tables: dict[str, LookupTable] = field(default_factory=dict)
     code: CodeFile | None = None
     header: Any = None  # of its struct of values, if it has C
+    hook: Hook | None = None
     sources: list[Path] = field(default_factory=list)  # the files of equations, included ones first
     table_units: dict[str, dict[str, int]] = field(default_factory=dict)  # by `table_unit`
     dimensions: dict[str, int] = field(default_factory=dict)  # numbers of indexes, by name

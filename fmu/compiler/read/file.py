@@ -33,6 +33,7 @@ from .content import (
     Element,
     Event,
     Expression,
+    Hook,
     ModelFile,
     ModelFileError,
     Sampler,
@@ -85,6 +86,8 @@ def read_tables(source: Source, solver_names: Iterable[str]) -> ModelFile:
                     _check_function_name(name, file)
                 file.functions[name] = function
     _read_functions(file, head.get("functions", {}))
+    if "hook" in head:
+        _read_hook(file, head)
     modes = head.get("modes", [])
     entries = [*keys.SECTIONS, "sampled", "events"]
     if sum(len(head.get(section, {})) for section in entries) + len(modes) > keys.MOST_ENTRIES:
@@ -112,7 +115,37 @@ def read_tables(source: Source, solver_names: Iterable[str]) -> ModelFile:
     for message, condition in head.get("check", {}).items():
         _read_check(file, message, condition)
     terminals.read(file, head.get("terminals", {}))
+    _check_places(file)
     return file
+
+
+def _read_hook(file: ModelFile, head: dict[str, Any]) -> None:
+    with placed("[hook]"):
+        given = keys.entries(head["hook"], keys.HOOK, "sources")
+        for key in ("modes", "sampled", "events"):
+            if head.get(key):
+                raise ModelFileError(f"decides all events, but there is {key}")
+        if not file.calculate:
+            raise ModelFileError(f"expected code with a function {file.path.stem}_calculate")
+        lists = (given.get(key, []) for key in ("indicators", "series"))
+        file.hook = Hook(given["sources"], *lists, given.get("reads", {}))
+        if missing := {*file.hook.series} - {*file.hook.indicators}:
+            raise ModelFileError(f"series: {min(missing)} is none of indicators")
+
+
+def _check_places(file: ModelFile) -> None:
+    """Check that each variable has a place of its own in the struct of values."""
+    where: dict[str, str] = {}
+    for variable in file.variables.values():
+        with placed(variable.place, variable.name):
+            if variable.field and not file.code:
+                raise ModelFileError("field: expected code above the first [section], which reads it")
+            if (other := where.setdefault(variable.field or variable.name, variable.name)) != variable.name:
+                raise ModelFileError(f"field: {shown(variable.field)} is the place of {other}")
+    for name in file.hook.indicators if file.hook else ():
+        with placed("[hook]", "indicators"):
+            if name not in file.variables or not file.variables[name].is_real:
+                raise ModelFileError(f"expected a real variable, got {shown(name)}")
 
 
 def _elements(

@@ -22,15 +22,17 @@ from .include import Source, source_of
 
 GROUPS = {"inputs": "inputs", "states": "states", "discrete": "held between events"}
 CALCULATED = ("where", "outputs")  # those without a value are written by C
+RATES = "dx"  # of a file with a hook
 Place = tuple[str | int, ...]  # a field of struct NAME_values, from its name
 
 
 @dataclass(frozen=True)
 class Field:
-    """A variable of a struct, or all elements of an array."""
+    """A field of a struct: a variable, or an array of variables."""
 
     name: str
-    elements: tuple[str, ...]  # names of variables
+    group: str  # the struct that it is in, within another; or none
+    elements: tuple[tuple[str, tuple[int, ...]], ...]  # names of variables with their indexes
     entry: Any
     prefix: str  # of the enum
 
@@ -44,20 +46,13 @@ class Field:
     def _type(self) -> Any:
         return self.entry.get("type") if isinstance(self.entry, dict) else None
 
-    @property
-    def sizes(self) -> list[range]:
-        """Indexes of an array."""
-        if "[" not in self.elements[0]:
-            return []
-        indexes = map(_indexes, self.elements)
-        return [range(min(column), max(column) + 1) for column in zip(*indexes, strict=True)]
-
     def lines(self) -> Iterator[str]:
         """Yield its declaration."""
         about = self.entry if isinstance(self.entry, dict) else {}
         texts = [about[key] for key in ("unit", "description") if type(about.get(key)) is str]
         comment = ": ".join(" ".join(text.split()) for text in texts).replace("*/", "* /")
-        sizes = "".join(f"[{len(size)}]" for size in self.sizes)
+        last = [max(column) for column in zip(*(at for _, at in self.elements), strict=True)]
+        sizes = "".join(f"[{index + 1}]" for index in last)
         yield f"{self.c_type} {self.name}{sizes};" + (comment and f" /* {comment} */")
 
     def enum(self) -> Iterator[str]:
@@ -70,11 +65,30 @@ class Field:
             yield "};"
 
     def places(self) -> Iterator[tuple[Place, str]]:
-        """Yield the places of variables, from the field."""
-        sizes = self.sizes
-        for name in self.elements:
-            pairs = zip(_indexes(name), sizes, strict=True)
-            yield (self.name, *(i - size.start for i, size in pairs)), name
+        """Yield the places of variables, from the field or its group."""
+        inside = (self.group, self.name) if self.group else (self.name,)
+        for name, indexes in self.elements:
+            yield (*inside, *indexes), name
+
+
+def fields_of(entries: Iterable[tuple[str, Any]], prefix: str) -> list[Field]:
+    """Return the fields of variables, from their names and entries."""
+    found: dict[tuple[str, str], list[tuple[str, tuple[int, ...], Any]]] = {}
+    for name, entry in entries:
+        given = entry.get("field") if isinstance(entry, dict) else None
+        path = given if isinstance(given, str) else name
+        group, _, field = path.partition("[")[0].rpartition(".")
+        found.setdefault((group, field), []).append((name, _indexes(path), entry))
+    result = []
+    for (group, field), members in found.items():
+        by_name = [at for name, at, _ in members if "[" in name]
+        first = [min(column) for column in zip(*by_name, strict=True)]  # C counts from 0
+        elements = [
+            (name, tuple(i - low for i, low in zip(at, first, strict=True)) if first else at)
+            for name, at, _ in members
+        ]
+        result.append(Field(field, group, tuple(elements), members[0][2], prefix))
+    return result
 
 
 class Header:
@@ -82,38 +96,40 @@ class Header:
 
     def __init__(self, source: Source) -> None:
         self.stem, self.folder = source.path.stem, source.path.parent
-        self.inner = [Header(included) for included in source.included]
+        self.inner = [header for each in source.included for header in Header(each).outer()]
         inner = {name for header in self.inner for _, name in header.parameters()}
         tables = source.tables
+        has_hook = "hook" in tables
         file = ModelFile("", "", {}, source.path, "", set())
         with suppress(AttributeError):  # what is wrong with it is said where it is read
             file.sizes.update(tables.get("sizes", {}).items())
 
-        def fields(section: str, only_called: bool = False) -> list[Field]:
-            given = tables.get(section)
-            entries = given.items() if isinstance(given, dict) else ()
+        def fields(*sections: str, only_called: bool = False) -> list[Field]:
             found = []
-            for key, entry in entries:
-                is_called = isinstance(entry, dict) and "value" not in entry
-                if not only_called or is_called:
-                    with suppress(Exception):  # as above
-                        found += [(each.name, entry) for each in elements(file, key, entry)]
-            runs = groupby(found, lambda pair: pair[0].partition("[")[0])
-            grouped = [(base, [*run]) for base, run in runs]
-            return [
-                Field(base, tuple(name for name, _ in run), run[0][1], self.stem)
-                for base, run in grouped
-            ]
+            for section in sections:
+                given = tables.get(section)
+                for key, entry in given.items() if isinstance(given, dict) else ():
+                    is_called = isinstance(entry, dict) and "value" not in entry
+                    if not only_called or is_called:
+                        with suppress(Exception):  # as above
+                            found += [(each.name, entry) for each in elements(file, key, entry)]
+            kept = [(name, entry) for name, entry in found if name not in inner]
+            return fields_of(kept, self.stem)
 
-        self.own = [f for f in fields("parameters") if not inner.issuperset(f.elements)]
+        self.own = fields("parameters")
         self.variables = {title: fields(section) for section, title in GROUPS.items()}
         modes = tables.get("modes", [])
         if isinstance(modes, dict | list):
-            names = [name for name in modes if isinstance(name, str)]
             boolean = {"type": BOOLEAN}
-            self.variables["modes"] = [Field(n, (n,), boolean, self.stem) for n in names]
-        called = [field for section in CALCULATED for field in fields(section, True)]
-        self.variables["calculated"] = called
+            names = [(name, boolean) for name in modes if isinstance(name, str)]
+            self.variables["modes"] = fields_of(names, self.stem)
+        self.variables["calculated"] = fields(*CALCULATED, only_called=not has_hook)
+        states = sum(len(field.elements) for field in self.variables["states"])
+        self.rates = [f"double {RATES}[{states}]; /* derivatives of the states */"] * has_hook
+
+    def outer(self) -> list["Header"]:
+        """Return this header; those that it includes if it has no parameters of its own."""
+        return [self] if self.own else self.inner
 
     def parameters(self) -> Iterator[tuple[Place, str]]:
         """Yield the places of parameters, from the struct of parameters."""
@@ -148,7 +164,13 @@ class Header:
         fields.append("double time; /* s */")
         for title, group in self.variables.items():
             fields += [f"/* {title} */"] if group else []
-            fields += [line for field in group for line in field.lines()]
+            for name, members in groupby(group, lambda field: field.group):
+                own = [line for field in members for line in field.lines()]
+                if name:
+                    lines += _struct(f"{self.stem}_{name}", own)
+                    own = [f"struct {self.stem}_{name} {name};"]
+                fields += own
+            fields += self.rates if title == "states" else []
         return "\n".join([*lines, *_struct(f"{self.stem}_values", fields)])
 
     @property
@@ -157,9 +179,9 @@ class Header:
         return bool(self.own) or any(header.has_parameters for header in self.inner)
 
 
-def _indexes(name: str) -> list[int]:
+def _indexes(name: str) -> tuple[int, ...]:
     """Return the indexes of an element."""
-    return [*map(int, re.findall(r"(?<=[\[,])\d+", name))]
+    return tuple(map(int, re.findall(r"(?<=[\[,])\d+", name)))
 
 
 def _struct(name: str, fields: Iterable[str]) -> list[str]:

@@ -30,6 +30,7 @@ MOST_SIZE = 20_000
 LONGEST_TEXT = 1000  # characters of a description
 LONGEST_MESSAGE = 500  # bytes: src/instance/state.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
+FIELD = re.compile(r"([A-Za-z_]\w*\.)?[A-Za-z_]\w*(\[\d\])*", re.ASCII)
 CODE = re.compile(r'[^\x00-\x1f\\"]+\.[ch]')
 # files that Windows cannot have, with any suffix
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
@@ -38,22 +39,22 @@ RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 TAKEN = {*RESERVED, *FURTHER, "sum", "der"}  # no names of functions
 NUMBERS = ("start", "min", "max", "nominal")
 CALCULATED = ("where", "outputs")
-OF_VALUES = ("value", "unit", "description", "variability", "derivative_of")
-OF_COUNTS = ("type", "value", "min", "max", "description")
-OF_ALL = ("start", "unit", "min", "max", "description")
+OF_VALUES = ("value", "unit", "description", "variability", "derivative_of", "field")
+OF_COUNTS = ("type", "value", "min", "max", "description", "field")
+OF_ALL = ("start", "unit", "min", "max", "description", "field")
 SECTIONS = {  # keys of their entries, and the one that each needs
     "parameters": ((*OF_ALL, "type", "variability"), "start"),
     "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative", "derivative_of", "causality"), "derivative"),
-    "discrete": (("start", "unit", "description", "type", "shown"), ""),
+    "discrete": (("start", "unit", "description", "type", "shown", "field"), ""),
     "where": ((*OF_VALUES, "type", "shown"), "value"),  # or expressions
     "outputs": ((*OF_VALUES, "type"), "value"),
 }
 OWN_KEYS = {
-    FOLLOWS: (("value", "unit", "description"), "value"),
-    OPTIONS: (("type", "start", "min", "max", "description", "variability"), "start"),
-    SWITCHES: (("type", "start", "description"), ""),
-    COUNTS: (("type", "start", "min", "max", "description", "shown"), ""),
+    FOLLOWS: (("value", "unit", "description", "field"), "value"),
+    OPTIONS: (("type", "start", "min", "max", "description", "variability", "field"), "start"),
+    SWITCHES: (("type", "start", "description", "field"), ""),
+    COUNTS: (("type", "start", "min", "max", "description", "shown", "field"), ""),
     "where": ((*OF_COUNTS, "shown"), "value"),
     "outputs": (OF_COUNTS, "value"),
 }
@@ -61,12 +62,13 @@ NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
     *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
-    *("functions", "sampled", "events", "check", "terminals"),
+    *("functions", "sampled", "events", "check", "terminals", "hook"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
 TABLE = ("x", "y", "z", "file", "interpolation", "outside")
 EVENT = ("when", "while", "where", "reinit", "set")
+HOOK = ("sources", "indicators", "series", "reads")
 SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
 NO_TABLES = ("name", "description", "include", "modes", "code")
@@ -175,6 +177,8 @@ READ = {
     "modes": _modes,
     "arguments": _arguments,
     "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
+    "field": _expect("a field of C such as damping[0]", str, FIELD.fullmatch),
+    **dict.fromkeys(("sources", "indicators", "series"), LIST),
     **dict.fromkeys(("file", "derivative_of"), TEXT),
 }  # how values of keys are read; others are expressions
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..expressions.expression import RELATIONS, Node, derivative_of, written
 from ..expressions.kinds import CONDITION
 from ..graph.graph import MOVING, Graph, Value
-from ..names import Fields
+from ..names import Fields, StructFields
 from ..plain_c.memory import is_real
 from ..plain_c.text import CTextError
 from . import file as file_reader
@@ -23,6 +23,7 @@ from .content import (
     ModelFileError,
     placed,
 )
+from .header import RATES
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
 LEAVES = {
@@ -40,9 +41,10 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     """Read and check a file for values of its expressions; ModelFileError if something is wrong."""
     file = file_reader.read(path, solver_names)
     # without states nothing is integrated: outputs follow at once
-    has_switches = bool(file.of("states") or file.events)
-    graph = file.graph = Graph(tables=file.tables, has_switches=has_switches)
-    calls = Calls(file.code.program, graph) if file.code else None
+    has_switches = file.hook is None and bool(file.of("states") or file.events)
+    is_exact = file.hook is None  # C by hand keeps its models where they have values
+    graph = Graph(tables=file.tables, has_switches=has_switches, is_guarded=is_exact)
+    file.graph, calls = graph, Calls(file.code.program, graph, is_exact) if file.code else None
     for variable in file.of(*LEAVES):
         op = "mode" if variable.kind == CONDITION else LEAVES[variable.section]
         variable.leaf = graph.value(op, name=variable.name)
@@ -51,6 +53,9 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     sections = ("parameters", "inputs", "states", "discrete", OPTIONS, SWITCHES)
     names = [[v.name for v in file.of(section)] for section in sections]
     file.fields = Fields([*names, calculated, [*file.modes, *counts]])
+    if file.hook:
+        states = [v.name for v in file.of("states")]
+        file.fields = StructFields(file.header.places, RATES, states)
     known = {variable.name: variable.leaf for variable in file.of(*LEAVES)}
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
@@ -127,10 +132,7 @@ def _written(
             return known[name]
         if known[name].op == "mode":
             return calls.conditions.choice(known[name], 1, 0)
-        items = file.kinds[name]
-        return calls.conditions.leaf(
-            name, tuple(range(1, 1 + len(items))) if isinstance(items, tuple) else None
-        )
+        return calls.conditions.leaf(name, file.variables[name].numbers)
 
     @cache
     def values() -> dict[str, Value]:

@@ -214,7 +214,7 @@ class Events:
 
     def functions(self, in_domain: str = "") -> list[str]:
         """Text of all functions and of the struct model_events; in_domain: behind their names."""
-        if not self:
+        if not self or self.file.hook:
             return []
         file, timed = self.file, [r for r in self.relations if r.time is not None]
         states = file.of("states")

@@ -35,8 +35,20 @@ LONG = 500  # lines for derivatives in small code: compilers need less time
 FOLLOWED = "relations_followed(&relations, ROOM, values, time, &copy)"
 
 
+def structure(file: ModelFile) -> str:
+    """Return the type of the value structure; with a hook that of NAME_values.h."""
+    return f"struct {file.path.stem}_values" if file.hook else STRUCTURE
+
+
+def symbol(file: ModelFile) -> str:
+    """Return the name of the struct model."""
+    return f"{file.path.stem}_model" if file.hook else SYMBOL
+
+
 def header(file: ModelFile) -> str:
     """Return the text of equations.h."""
+    if file.hook:
+        return filled("hooked.h.in", header=f"{file.path.stem}_model.h")
     events = Events(file)
     groups = _ranges(file) | {
         "calculated": [file.fields.value(v.name) for v in file.calculated_reals],
@@ -57,31 +69,84 @@ def source(file: ModelFile) -> str:
     """Return the text of equations.c."""
     events = Events(file)
     followed = _followed(file, events)
-    has_kinks = _has_kinks(followed)
+    has_kinks = _has_kinks(followed) and not file.hook
     series = Series(file.graph, *(({}, []) if has_kinks else followed), leaves(file))
     has_domains = bool(events.located) and _may_end(file)
     smooth = _smooth(file)
     parts = {
         **smooth,
-        **_series(series, has_domains),
+        **_series(file, series, has_domains),
         "series_of_model": [] if has_kinks else [".series = &series,"],
         **_calculated(file, events),
         **_domains(file, events, series, has_domains, smooth["jacobian_size"]),
         "events": events.functions("_in_domain" * has_domains),
         "checks": _checks(file),
+        **_hooked(file),
     }
-    return filled(
+    written = filled(
         "equations.c.in",
         **parts,
         tables=_tables(file),  # those that the parts read
-        followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
+        followed=_modes_of(file, events),
         expressions=_expressions(file),
         ranges=[
-            *_parameter_lines(file),
+            *(_hooked_parameters(file) if file.hook else _parameter_lines(file)),
             *_range_lines({k: v for k, v in _ranges(file).items() if k != "parameters"}),
         ],
-        model_events=[".events = &events,"] if events else [],
+        model_events=_model_events(file, events),
     )
+    for common, own in ((STRUCTURE, structure(file)), (SYMBOL, symbol(file))):
+        written = written.replace(common, own)
+    return written
+
+
+def _model_events(file: ModelFile, events: Events) -> list[str]:
+    name = f"{file.path.stem}_events" if file.hook else "events"
+    return [f".events = &{name},"] if events else []
+
+
+def _modes_of(file: ModelFile, events: Events) -> list[str]:
+    """Statements that let `values` have the modes in effect."""
+    if file.hook:
+        places = (file.fields.value(file.of(section)[0].name) for section in ("states", "inputs"))
+        state, of_input = (f"&values->{place}" for place in places)
+        return _in_effect(file, state, of_input)
+    return [f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else []
+
+
+def _in_effect(file: ModelFile, state: str, of_input: str) -> list[str]:
+    call = f"{file.path.stem}_in_effect(values, {state}, {of_input}, &copy)"
+    return [f"{STRUCTURE} copy;", f"values = {call};"]
+
+
+def _hooked(file: ModelFile) -> dict[str, list[str]]:
+    """Return what C by hand adds."""
+    if not file.hook:
+        return dict.fromkeys(("modes", "modes_of_origin", "further_checks", "contiguous"), [])
+    origin = [
+        f"const double state[] = {{{', '.join(f'row[{i}][0]' for i in range(len(file.of('states'))))}}};",
+        f"const double input[] = {{{', '.join(f'origin->inputs[{i}][0]' for i in range(len(file.of('inputs'))))}}};",
+    ]
+    contiguous = []
+    for fields in (_ranges(file)[key] for key in ("inputs", "states", "dx")):
+        ends = [f"offsetof({STRUCTURE}, {field})" for field in (fields[0], fields[-1])]
+        size = f"{len(fields) - 1} * sizeof(double)"
+        contiguous.append(f'_Static_assert({ends[1]} - {ends[0]} == {size}, "fields side by side");')
+    return {
+        "modes": _in_effect(file, "state", "input"),
+        "modes_of_origin": [*origin, *_in_effect(file, "state", "input")],
+        "further_checks": [
+            f"if (!{file.path.stem}_check(values, text, size)) {{",
+            "    return STATUS_INVALID_PARAMETERS;",
+            "}",
+        ],
+        "contiguous": contiguous,
+    }
+
+
+def _hooked_parameters(file: ModelFile) -> list[str]:
+    size = f"sizeof(struct {file.path.stem}_parameters)"
+    return [f".parameters = {{offsetof({STRUCTURE}, parameters), {size}}},"]
 
 
 def _expressions(file: ModelFile) -> list[str]:
@@ -156,7 +221,7 @@ def _smooth(file: ModelFile) -> dict[str, Any]:
         for x, slope in found.get(value, {}).items()
     }
     slopes = {
-        (i, j): rows[i][state.leaf]
+        (i, j): _where_it_moves(file, state.value, rows[i][state.leaf])
         for j, state in enumerate(states)
         for i in range(count)
         if state.leaf in rows[i] and not is_number(rows[i][state.leaf], 0.0)
@@ -179,9 +244,28 @@ def _smooth(file: ModelFile) -> dict[str, Any]:
     }
 
 
+def _where_it_moves(file: ModelFile, rate: Value, slope: Value) -> Value:
+    """Leave out what follows from a state that rests, by the conditions on which its rate is 0.
+
+    An elimination that exchanges rows would mix the rounding of others into it. With a hook, a
+    state whose rate is another state rests with that one.
+    """
+    if rate.op == "state" and file.hook:
+        rate = file.variables[rate.name].value
+    if is_number(rate, 0.0):
+        return rate
+    if rate.op != "if" or rate.arguments[0].moves:
+        return slope
+    condition, *cases = rate.arguments
+    first, second = (_where_it_moves(file, case, slope) for case in cases)
+    return slope if first is second else file.graph.value("if", condition, first, second)
+
+
 def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list[Value]]:
     """Of what there is a series: rates of the states and, signed, distances."""
     rates = {state.leaf: state.value for state in file.of("states")}
+    if file.hook:
+        return rates, [file.variables[name].value for name in file.hook.series]
     return rates, [events.signed(relation) for relation in events.located]
 
 
@@ -192,8 +276,11 @@ def _has_kinks(followed: tuple[dict[Value, Value], list[Value]]) -> bool:
     return any(v.op in RELATIONS and v.moves for v in nodes)
 
 
-def _series(series: Series, has_domains: bool) -> dict[str, object]:
+def _series(file: ModelFile, series: Series, has_domains: bool) -> dict[str, object]:
     rows = [str(row) for row in series.row_of_followed]
+    if file.hook:
+        of_name = dict(zip(file.hook.series, rows, strict=True))
+        rows = [of_name.get(name, "0") for name in file.hook.indicators]
     inner = series.inner()
     return {
         **series.parts(),

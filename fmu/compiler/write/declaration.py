@@ -114,15 +114,15 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "name": file.name,
         "description": file.description or file.name,
         "header": "equations.h",
-        "values": c_model.STRUCTURE,
-        "symbol": c_model.SYMBOL,
-        "event_indicators": [*indicators],
+        "values": c_model.structure(file),
+        "symbol": c_model.symbol(file),
+        "event_indicators": file.hook.indicators if file.hook else [*indicators],
         "naming": "structured" if any("[" in name for name, _ in keys(file)) else "flat",
         "flat": flat(file),
         "modulated": modulated(file),
         "time_events": len(indicators) < len(relations) or bool(file.sampled),
     }
-    includes = [TIME, *([EVENTS] if relations or file.sampled else [])]
+    includes = [TIME, *([EVENTS] if relations or file.sampled or file.hook else [])]
     includes += [SOLVER] if states else [TIME_EVENTS] if file.sampled else []
     helpers = {variable.name for variable in file.of("where")}  # last
     return {
@@ -224,11 +224,14 @@ def _entries_of(
         entries |= _dependencies(variable.value, file)
     if variable.section == "states":
         entries |= {"initial": "exact", "dependencies": [variable.name]}
-        entries["reinit"] = any(variable.name in change.reinit for change in file.changes)
+        is_written = any(variable.name in change.reinit for change in file.changes)
+        entries["reinit"] = is_written or file.hook is not None
     if variable.section == "discrete":
         entries |= {"variability": "discrete", "initial": "exact"}
         leaves = _reached({("discrete", variable.name)}, file, ["discrete"])
         entries |= _known_of(leaves, file)
+    if variable.section == "discrete" and file.hook:
+        entries |= {"initial": "calculated", **_known_of(_all_known(file), file)}
     if variable.initial is not None:
         op = variable.leaf.op
         entries |= {"initial": "calculated", **_initially({(op, variable.name)}, {}, file)}
@@ -236,10 +239,12 @@ def _entries_of(
         entries["unit"] = _unit(units, variable.exponents, variable.unit)
     if variable.display:
         entries["display"] = dict(zip(("name", "factor", "offset"), variable.display, strict=True))
-    numbers = {key: getattr(variable, key) for key in NUMBERS}
+    keys = NUMBERS if entries.get("initial") != "calculated" else NUMBERS[1:]
+    numbers = {key: getattr(variable, key) for key in keys}
     entries |= {key: number for key, number in numbers.items() if number is not None}
     is_derivative = bool(variable.derivative_of) and variable.section != "states"
-    if variable.section == "outputs" or is_derivative:
+    is_indicator = file.hook is not None and variable.name in file.hook.indicators
+    if variable.section == "outputs" or is_derivative or is_indicator:
         entries |= _dependencies(variable.value, file)
     if variable.derivative_of:
         entries["derivative_of"] = variable.derivative_of
@@ -266,7 +271,8 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
     if is_calculated:
         entries |= _dependencies(variable.value, file)
     elif variable.section == COUNTS:
-        entries |= _known_of(_reached({leaf}, file, ["discrete"]), file)
+        changed = _all_known(file) if file.hook else _reached({leaf}, file, ["discrete"])
+        entries |= _known_of(changed, file)
         entries |= _initially({leaf}, {}, file)
     else:
         start = variable.start
@@ -330,6 +336,11 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
             todo += file.graph.relations[name].distance.leaves
         if name in file.graph.segments:
             todo += file.graph.segments[name].argument.leaves
+        if file.hook and (op == "state" or _is_in(file, name, "discrete", COUNTS)):
+            given = file.hook.reads.get(name, [])
+            todo += [known for known in _all_known(file) if known[1] in given]
+            is_any = "state" in changed and not (op == "state" and given)
+            todo += _all_known(file) - found if is_any else ()
         if "state" in changed:
             initial = file.variables[name].initial if name in file.variables else None
             todo += initial.value.leaves if initial is not None else ()
@@ -339,6 +350,12 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
                 own = [*change.conditions, change.given[name]]
                 todo += [leaf for expression in own for leaf in expression.value.leaves]
     return found
+
+
+def _all_known(file: ModelFile) -> set[Leaf]:
+    """All that the C of a hook may read, when it sets modes and states."""
+    known = file.of("states", "inputs", "parameters", OPTIONS, SWITCHES)
+    return {(variable.leaf.op, variable.name) for variable in known}
 
 
 def _initially(

@@ -1,11 +1,8 @@
 /* The equations of the plant. rp_plant.h says what they mean. In given modes they are smooth: a
- * joint that slides forward keeps the sign of its friction also where its velocity passes 0.
- *
- * Functions that are linear in what moves take products of it as arguments: rp_plant_series.c gives
- * them coefficients of order k in place of values. */
+ * joint that slides forward keeps the sign of its friction also where its velocity passes 0. */
 #pragma once
 
-#include "rp_payload.h"
+#include "../rp_manipulator/rp_payload.h"
 #include "rp_plant.h"
 
 /* The plant in a state, with what many equations share. */
@@ -61,20 +58,14 @@ static inline real plant_kinetic_energy(const struct plant *plant) {
 
 /* ---- Forces --------------------------------------------------------------------------------- */
 
-/* Q = J^T w with the rows of (1) and (3), from products of x, y, c1 and s1 with the force. */
-static inline void plant_wrench_sums(real x_fy, real y_fx, real mz, real c1_fx, real s1_fy,
-                                     real forces[2]) {
-    forces[0] = x_fy - y_fx + mz;
-    forces[1] = c1_fx + s1_fy;
-}
-
+/* Q = J^T w with the rows of (1) and (3). */
 static inline void plant_wrench_forces(const struct plant *plant, const real wrench[3],
                                        real forces[2]) {
     const struct arm *hand = &plant->hand;
     real position[2];
     arm_end_effector_position(hand, position);
-    plant_wrench_sums(position[0] * wrench[1], position[1] * wrench[0], wrench[2],
-                      hand->c1 * wrench[0], hand->s1 * wrench[1], forces);
+    forces[0] = position[0] * wrench[1] - position[1] * wrench[0] + wrench[2];
+    forces[1] = hand->c1 * wrench[0] + hand->s1 * wrench[1];
 }
 
 /* Largest friction of a joint at rest, N.m (joint 0) or N (joint 1). */
@@ -158,19 +149,10 @@ static inline real plant_penetration(int contact, real lower, real upper, real q
     return contact > 0 ? lower - q : q - upper;
 }
 
-/* x (1 + c d'), from the product x q': the stop pushes while 1 + c d' is above 0. */
-static inline real plant_push(const struct rp_plant_parameters *p, int contact, int i, real x,
-                              real x_dq) {
-    const real damping = p->stop_damping[i] * x_dq;
-    return contact > 0 ? x - damping : x + damping;
-}
-
-/* k d (1 + c d'), on the joint. */
-static inline real plant_stop_force(const struct rp_plant_parameters *p, int contact, int i, real d,
-                                    real push) {
-    const real elastic = p->stop_stiffness[i] * d;
-    const real force = elastic * push;
-    return contact > 0 ? force : -force;
+/* 1 + c d': the stop pushes while this is above 0. */
+static inline real plant_push(const struct rp_plant_parameters *p, int contact, int i, real dq) {
+    const real damping = p->stop_damping[i] * dq;
+    return contact > 0 ? 1.0 - damping : 1.0 + damping;
 }
 
 /* Hunt and Crossley: k d (1 + c d'), on the joint. In a given contact it continues past d = 0, up
@@ -181,7 +163,8 @@ static inline real plant_compliant_force(const struct rp_plant_parameters *p, in
         return 0.0;
     }
     const real d = plant_penetration(contact, p->lower[i], p->upper[i], q);
-    return plant_stop_force(p, contact, i, d, plant_push(p, contact, i, 1.0, dq));
+    const real force = p->stop_stiffness[i] * d * plant_push(p, contact, i, dq);
+    return contact > 0 ? force : -force;
 }
 
 /* Also of a stop that the joint leaves behind: what it does not give back is lost. */
@@ -225,25 +208,15 @@ static inline struct plant_hold plant_hold(const struct rp_plant_parameters *p,
 
 /* ---- Efforts -------------------------------------------------------------------------------- */
 
-/* applied: tau + Q. friction, stop: as in struct plant_hold. */
-static inline real plant_effort(const struct rp_plant_parameters *p,
-                                const struct rp_plant_modes *modes, int i, real dq, real applied,
-                                real friction, real stop) {
-    const real damped = applied - p->damping[i] * dq;
-    const real rubbed = plant_slides(modes->joint[i]) ? damped - friction : damped;
-    return modes->contact[i] == RP_PLANT_APART ? rubbed : rubbed + stop;
-}
-
+/* tau + Q - damping q' - friction + compliant stop; a stuck joint's friction is not in it. */
 static inline void plant_efforts(const struct plant *plant, const struct rp_plant_parameters *p,
                                  const struct rp_plant_modes *modes, const real tau[2],
                                  const real Q[2], real efforts[2]) {
     for (int i = 0; i < 2; i++) {
         const real q = plant->arm.q[i], dq = plant->arm.dq[i];
         const real friction = plant_friction(p, modes->joint[i], i, dq);
-        const int contact = modes->contact[i];
-        const real stop =
-            contact == RP_PLANT_APART ? 0.0 : plant_compliant_force(p, contact, i, q, dq);
-        efforts[i] = plant_effort(p, modes, i, dq, tau[i] + Q[i], friction, stop);
+        const real stop = plant_compliant_force(p, modes->contact[i], i, q, dq);
+        efforts[i] = tau[i] + Q[i] - p->damping[i] * dq - friction + stop;
     }
 }
 
@@ -318,20 +291,6 @@ static inline void plant_motion(const struct plant *plant, const int mode[2], co
     }
 }
 
-/* The same from parameters, states and inputs: the right side. */
-static inline void plant_accelerations(const struct rp_plant_parameters *p,
-                                       const struct rp_plant_modes *modes, const real q[2],
-                                       const real dq[2], const struct rp_plant_inputs *inputs,
-                                       real ddq[2], real reaction[2]) {
-    const bool attached = modes->payload == RP_PLANT_ATTACHED;
-    const struct plant plant = plant_in_state(p, attached, q, dq);
-    real applied[2];
-    real efforts[2];
-    plant_wrench_forces(&plant, inputs->wrench, applied);
-    plant_efforts(&plant, p, modes, inputs->tau, applied, efforts);
-    plant_motion(&plant, modes->joint, efforts, ddq, reaction);
-}
-
 /* ---- Event indicators ----------------------------------------------------------------------- */
 
 enum { PLANT_INDICATORS = 5, PLANT_PUSH = 4 }; /* of a joint; the last one of them */
@@ -358,7 +317,7 @@ static inline void plant_stop_indicators(const struct rp_plant_parameters *p, in
     }
     z[contact > 0 ? 2 : 3] = plant_penetration(contact, p->lower[i], p->upper[i], q);
     if (p->stop_damping[i] > 0.0) {
-        const real push = plant_push(p, contact, i, 1.0, dq);
+        const real push = plant_push(p, contact, i, dq);
         z[PLANT_PUSH] = abs(contact) == RP_PLANT_PUSHED ? push : -push;
     }
 }
@@ -384,19 +343,3 @@ static inline void plant_indicators(const struct rp_plant_parameters *p,
         plant_stop_indicators(p, modes->contact[i], i, q, dq, z);
     }
 }
-
-/* ---- Derived -------------------------------------------------------------------------------- */
-
-/* J[i + 2 j] is the derivative of ddq[i] by number j of q and dq. */
-void plant_accelerations_jacobian(const struct rp_plant_parameters *p,
-                                  const struct rp_plant_modes *modes, const double q[2],
-                                  const double dq[2], const struct rp_plant_inputs *inputs,
-                                  double J[]);
-
-/* First derivatives of the reactions along a curve of positions, velocities and inputs; the
- * parameters rest. */
-void plant_reaction_rates(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
-                          const double q[2], const double dq[2],
-                          const struct rp_plant_inputs *inputs, const double q_first[2],
-                          const double dq_first[2], const struct rp_plant_inputs *inputs_first,
-                          double reaction_first[2]);

@@ -19,7 +19,7 @@ static int sign_of(double x) {
 }
 
 static bool is_near_change(const struct rp_plant_parameters *p, int joint, int side, double dq) {
-    return fabs(plant_push(p, side, joint, 1.0, dq)) <= rp_plant_near(0.0);
+    return fabs(plant_push(p, side, joint, dq)) <= rp_plant_near(0.0);
 }
 
 static int contact_at(const struct rp_plant_parameters *p, int joint, int side, double dq,
@@ -27,7 +27,7 @@ static int contact_at(const struct rp_plant_parameters *p, int joint, int side, 
     if (side * before > 0 && is_near_change(p, joint, side, dq)) {
         return before;
     }
-    const double push = plant_push(p, side, joint, 1.0, dq);
+    const double push = plant_push(p, side, joint, dq);
     return side * (push > 0.0 ? RP_PLANT_PUSHED : RP_PLANT_LET_GO);
 }
 

@@ -6,15 +6,11 @@ static bool is_attached(const struct rp_plant_modes *modes) {
     return modes->payload == RP_PLANT_ATTACHED;
 }
 
-/* As plant_efforts; what is 0 is not calculated: right-hand sides take a third less time. */
 static inline void efforts_of_inputs(const struct plant *plant, const struct rp_plant_parameters *p,
                                      const struct rp_plant_modes *modes,
                                      const struct rp_plant_inputs *inputs, double efforts[2]) {
-    const double *w = inputs->wrench;
-    double Q[2] = {0.0, 0.0};
-    if (w[0] != 0.0 || w[1] != 0.0 || w[2] != 0.0) {
-        plant_wrench_forces(plant, w, Q);
-    }
+    double Q[2];
+    plant_wrench_forces(plant, inputs->wrench, Q);
     plant_efforts(plant, p, modes, inputs->tau, Q, efforts);
 }
 
@@ -50,22 +46,5 @@ void rp_plant_motion(const struct rp_plant_parameters *p, const struct rp_plant_
     const struct plant plant = plant_in_state(p, is_attached(modes), q, dq);
     double efforts[2];
     efforts_of_inputs(&plant, p, modes, inputs, efforts);
-    if (plant.armature2 == 0.0 && modes->joint[0] != RP_PLANT_STUCK &&
-        modes->joint[1] != RP_PLANT_STUCK) {
-        // the same bits without the divisions that armature takes
-        arm_forward_dynamics(&plant.arm, efforts, motion->ddq);
-        motion->reaction[0] = motion->reaction[1] = 0.0;
-        return;
-    }
     plant_motion(&plant, modes->joint, efforts, motion->ddq, motion->reaction);
-}
-
-/* Along the motion, whose velocities and accelerations are the rates of q and q'. */
-void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
-                             const struct rp_plant_modes *modes, const double q[2],
-                             const double dq[2], const struct rp_plant_inputs *inputs,
-                             const struct rp_plant_inputs *du, double rates[2]) {
-    struct rp_plant_motion now;
-    rp_plant_motion(p, modes, q, dq, inputs, &now);
-    plant_reaction_rates(p, modes, q, dq, inputs, dq, now.ddq, du, rates);
 }
