@@ -17,8 +17,7 @@ from typing import Any
 
 import pytest
 
-from tests.equations.compiled import BUILD, LENGTH, Origin
-from tests.prove.problems import COMPILE
+from tests.equations.compiled import BUILD, LENGTH, Origin, Words
 from tests.support.paths import ROOT
 from tests.support.plain_equations import (
     STATES,
@@ -32,12 +31,9 @@ from tests.support.plain_equations import (
     precision,
 )
 
-MODELS = ROOT / "models"
-PLANT, ARM = MODELS / "rp_plant", MODELS / "rp_manipulator"
-FOLDERS = (PLANT, PLANT / "equations", ARM, MODELS, ROOT / "src" / "model")
-SOURCES = (PLANT / "rp_plant_series.c", PLANT / "rp_series.c")
-MADE = BUILD / "models" / "rp_manipulator"  # arm_values.h
-NEVER_CALLED = "rp_plant_first_modes"  # while no mode is decided
+PLANT = ROOT / "models" / "rp_plant"
+LIBRARIES = [BUILD / "libRPPlant_equations.a", BUILD / "models" / "rp_plant" / "librp_plant.a"]
+SHOWN = "extern const char rp_plant_model[]; const char *const shown = rp_plant_model;"
 STUCK, FREE = 0, 2
 ATTACHED, RELEASED = 1, 2
 NONE, COMPLIANT = 1, 3
@@ -125,10 +121,10 @@ def exact(plain: PlainEquations, plant: Any, scale: float, inputs: Inputs) -> li
         return at[name] if isinstance(name, int) else getattr(at, name)
 
     def leaf(place: Place) -> Sized:
-        argument, *path = place
+        _, *path = place
         if path[0] == "inputs":
             return Sized.of(*inputs[INPUTS.index((path[1], path[2]))])
-        return Sized.of(reduce(part, path, plant.modes if argument == "modes" else plant))
+        return Sized.of(reduce(part, path, plant))
 
     motion = plain.motion(leaf, ORDER, scale)
     followed = [("values", "indicators", i) for i in indicators(plant)]
@@ -136,18 +132,17 @@ def exact(plain: PlainEquations, plant: Any, scale: float, inputs: Inputs) -> li
 
 
 class InC:
-    """The series of the C sources."""
+    """The series of the libraries of the build."""
 
     def __init__(self, plain: PlainEquations, library: Path) -> None:
         self.plain = plain
-        options = [
-            *(f"-I{folder}" for folder in (*FOLDERS, MADE)),
-            f"-Wl,--defsym={NEVER_CALLED}=0",
-        ]
-        command = [*COMPILE, "-shared", "-fPIC", *options, *SOURCES, "-o", library, "-lm"]
-        subprocess.run(command, check=True)
+        command = ["cc", "-shared", "-fPIC", "-xc", "-", "-xnone", "-o", library]
+        command += ["-Wl,--start-group", *LIBRARIES, "-Wl,--end-group", "-lm"]
+        subprocess.run(command, input=SHOWN, text=True, check=True)
         self.library = ctypes.CDLL(str(library))
-        self.row_count, rows, extend = (ctypes.c_size_t * 3).in_dll(self.library, "rp_plant_series")
+        model = ctypes.c_size_t.in_dll(self.library, "shown").value
+        series = Words.from_address(model).series
+        self.row_count, rows, extend = (ctypes.c_size_t * 3).from_address(series)
         self.row_of_indicator = (ctypes.c_size_t * 10).from_address(rows)
         number, pointer = ctypes.c_int, ctypes.c_void_p
         self.extend = ctypes.CFUNCTYPE(number, pointer, number, number, pointer)(extend)
@@ -181,7 +176,7 @@ class InC:
 
 @pytest.fixture(scope="module")
 def in_c(tmp_path_factory: pytest.TempPathFactory) -> InC:
-    plain = PlainEquations(PLANT / "rp_plant_calculated.h", FOLDERS, "rp_plant_calculate")
+    plain = PlainEquations(PLANT / "rp_plant_calculated.h", "rp_plant_calculate")
     return InC(plain, tmp_path_factory.mktemp("series") / "series.so")
 
 

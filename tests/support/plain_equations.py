@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from operator import methodcaller
 from pathlib import Path
@@ -107,8 +107,8 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 class PlainEquations:
     """What a function in a header writes, as values of a graph with the places of its leaves."""
 
-    def __init__(self, header: Path, includes: Iterable[Path], function: str) -> None:
-        program = read(header, includes, ["model.h"], made)
+    def __init__(self, header: Path, function: str) -> None:
+        program = read(header, made=made)
         graph = Graph(has_switches=False, is_guarded=False)
         self.interpreter = Interpreter(program, graph, doubles_move=False)
         self.places: dict[Value, Place] = {}
