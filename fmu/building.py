@@ -18,6 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from compiler.names import OF_VALUES
 from compiler.read.content import ModelFileError
 from compiler.read.model_file import ModelFile
 from compiler.write import declaration, lock
@@ -35,6 +36,30 @@ PLACES = {"fmi2": "", "fmi3": "fmi3"}  # below the folder of the output
 SYSTEM_COMPILERS = ("gcc", "clang")
 LONG = 200_000  # bytes of C that a compiler optimizes with less time
 INSTALL = 'pip install "rparm[build]" installs zig'
+
+
+@dataclass(frozen=True)
+class Hook:
+    """C files beside a file with equations, with the headers that are made for them."""
+
+    sources: list[Path]
+    include: list[Path]
+    root: Path | None  # folder of all that they include
+
+    @classmethod
+    def of(cls, file: ModelFile, work: Path) -> Hook:
+        """Write the headers of a file with a hook; without one there is nothing."""
+        if file.hook is None:
+            return cls([], [], None)
+        folder = file.path.resolve().parent
+        headers = {header.folder.resolve(): header for header in file.header.all()}
+        root = Path(os.path.commonpath([*headers, *(p.resolve().parent for p in file.files)]))
+        for place, header in headers.items():
+            made = work / "made" / place.relative_to(root)
+            made.mkdir(parents=True, exist_ok=True)
+            _write(made, {header.stem + OF_VALUES: header.text()})
+        include = [work / "made" / place.relative_to(root) for place in headers]
+        return cls([folder / name for name in file.hook.sources], [folder, *include], root)
 
 
 def write_c(file: ModelFile, references: dict[lock.Key, int], folder: Path) -> Declaration:
@@ -64,13 +89,14 @@ def build(
     }
     _write(work, texts)
     document([work / "README.md"], work / "modelDescription.xml", work / "documentation")
+    hook = Hook.of(file, work)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        libraries = list(pool.map(lambda runtime: _libraries(file.name, runtime, work), runtimes))
+        libraries = list(pool.map(lambda one: _libraries(file.name, one, work, hook), runtimes))
     entries = {}
     for version in PLACES:
         folder = work / version
         folder.mkdir()
-        _write_sources(version, runtimes[0], work, folder / "sources")
+        _write_sources(version, runtimes[0], work, hook, folder / "sources")
         _write(folder, release_files(version, declared, provenance, folder / "sources"))
         entries[version] = [
             *(built[version] for built in libraries),
@@ -84,11 +110,14 @@ def build(
     return entries
 
 
-def _libraries(name: str, runtime: Runtime, work: Path) -> dict[str, tuple[str, Path]]:
+def _libraries(
+    name: str, runtime: Runtime, work: Path, hook: Hook
+) -> dict[str, tuple[str, Path]]:
     """Link the shared object for one platform; return name and file by the version of FMI."""
     folder = work / runtime.content["platform"]
     folder.mkdir()
-    objects = runtime.compile([work / source for source in C_FILES], folder)
+    sources = [*(work / source for source in C_FILES), *hook.sources]
+    objects = runtime.compile(sources, folder, hook.include)
     file = f"{name}{runtime.content['suffix']}"
     for version in PLACES:
         (folder / version).mkdir()
@@ -98,10 +127,12 @@ def _libraries(name: str, runtime: Runtime, work: Path) -> dict[str, tuple[str, 
     return {x: (f"{place}/{file}", folder / x / file) for x, place in places.items()}
 
 
-def _write_sources(version: str, runtime: Runtime, work: Path, output: Path) -> None:
+def _write_sources(version: str, runtime: Runtime, work: Path, hook: Hook, output: Path) -> None:
     """Write the folder sources/ of an FMU: all that its shared object consists of."""
-    own = Library("model", [work / name for name in C_FILES], [work], None)
-    write(collect(runtime.sources(version, own, work)).texts, output)
+    sources = [*(work / name for name in C_FILES), *hook.sources]
+    own = Library("model", sources, [work, *hook.include], None)
+    roots = {own.name: work} | ({"hook": hook.root} if hook.root else {})
+    write(collect(runtime.sources(version, own, roots)).texts, output)
 
 
 def _licenses(runtimes: list[Runtime]) -> Iterable[tuple[str, Path]]:
@@ -139,12 +170,13 @@ class Runtime:
         """Return the files or folders of a list in runtime.json."""
         return [self.folder / item for item in listed if item]
 
-    def compile(self, sources: list[Path], work: Path) -> list[Path]:
+    def compile(self, sources: list[Path], work: Path, include: Iterable[Path] = ()) -> list[Path]:
         """Compile source files in the folder `work`, all at once; return their objects."""
         # what warnings are about, the user has not written
         options = [o for o in self.content["options"] if o and not o.startswith("-W")]
         options = [str(self.folder / o) if o.endswith(".h") else o for o in options]
-        folders = [f"-I{path}" for path in self.paths(self.content["include"])]
+        own = [os.path.relpath(path, work) for path in include]
+        folders = [f"-I{path}" for path in (*own, *self.paths(self.content["include"]))]
 
         def compiled(source: Path) -> Path:
             here = os.path.relpath(source, work)  # no folder's name gets into the object
@@ -181,14 +213,14 @@ class Runtime:
                 way_out = "the C that rparm wrote is wrong: please report this with the file"
             raise ModelFileError(f"{command[0]}: {reason:.300}; {way_out}")
 
-    def sources(self, version: str, own: Library, root: Path) -> Manifest:
+    def sources(self, version: str, own: Library, roots: dict[str, Path]) -> Manifest:
         """Return all sources of a version's shared object, with the model's own part."""
         content = self.content
         entries = [content["versions"][version]["sources"], *content["sources"]]
         shared = manifest(entries, content["roots"], self.folder)
         include = [*own.include, *self.paths(content["include"])]
         model = Library(own.name, own.sources, include, own.prelude)
-        return Manifest([model, *shared.libraries], shared.roots | {own.name: root})
+        return Manifest([model, *shared.libraries], roots | shared.roots)
 
 
 def _found(words: list[str], of_this_machine: bool) -> list[str]:

@@ -182,7 +182,7 @@ def _in_tables(content: Any) -> Iterator[str]:
         for name, value in content.items():
             if name in ("code", "file") and isinstance(value, str):
                 yield value
-            if name == "include" and isinstance(value, list):
+            if name in ("include", "sources") and isinstance(value, list):
                 yield from (each for each in value if isinstance(each, str))
             yield from _in_tables(value)
 

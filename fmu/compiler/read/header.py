@@ -127,6 +127,12 @@ class Header:
         states = sum(len(field.elements) for field in self.variables["states"])
         self.rates = [f"double {RATES}[{states}]; /* derivatives of the states */"] * has_hook
 
+    def all(self) -> Iterator["Header"]:
+        """Yield this header and those that it includes."""
+        yield self
+        for header in self.inner:
+            yield from header.all()
+
     def outer(self) -> list["Header"]:
         """Return this header; those that it includes if it has no parameters of its own."""
         return [self] if self.own else self.inner
