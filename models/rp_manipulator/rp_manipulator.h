@@ -13,23 +13,7 @@
  *
  * All functions are pure: they read their inputs, write their trailing outputs, keep nothing,
  * allocate nothing. Inputs are taken as they are; results for parameters that
- * rp_parameters_check refuses, and for states that overflow, may be infinite or NaN. */
+ * arm.toml refuses, and for states that overflow, may be infinite or NaN. */
 #pragma once
 
 #include "arm_values.h"
-
-#include <stdbool.h>
-#include <stddef.h>
-
-/* True where the equations have a solution, for parameters in the ranges of struct arm_parameters:
- * m1 lc1^2 + I1z + I2z > 0, without which link 2 at L = 0 leaves joint 1 without inertia. False:
- * why is in text. */
-bool rp_parameters_check(const struct arm_parameters *p, char *text, size_t size);
-
-/* Force and moment that each link receives through its joint, in the frame of the link. */
-struct rp_joint_loads {
-    double f1[3];   /* N */
-    double tau1[3]; /* N.m; tau1[1] drives joint 1 */
-    double f2[3];   /* N; f2[2] drives joint 2 */
-    double tau2[3]; /* N.m */
-};

@@ -49,19 +49,6 @@ static inline struct vector vector_cross(struct vector u, struct vector v) {
     };
 }
 
-static inline void write_vector(struct vector v, real written[3]) {
-    written[0] = v.x;
-    written[1] = v.y;
-    written[2] = v.z;
-}
-
-static inline void write_loads(const struct joint_loads *loads, struct rp_joint_loads *written) {
-    write_vector(loads->f1, written->f1);
-    write_vector(loads->tau1, written->tau1);
-    write_vector(loads->f2, written->f2);
-    write_vector(loads->tau2, written->tau2);
-}
-
 /* ---- Forward -------------------------------------------------------------------------------- */
 
 /* omega' x r + omega x (omega x r): acceleration of a point fixed to a body whose origin does not

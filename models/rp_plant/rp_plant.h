@@ -15,6 +15,8 @@
 #include "../rp_manipulator/rp_manipulator.h"
 #include "rp_plant_values.h"
 
+#include <stdbool.h>
+
 enum rp_plant_joint_mode {
     RP_PLANT_BACKWARD = -1, /* slides, friction drives it forward */
     RP_PLANT_STUCK = 0,     /* at rest, by friction or on a closed stop */

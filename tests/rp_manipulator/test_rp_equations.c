@@ -163,9 +163,8 @@ static void test_mass_matrix_rate_less_twice_coriolis_is_skew(void) {
 /* ---- Newton-Euler recursion ----------------------------------------------------------------- */
 
 /* Loads of the joints in the sample. */
-static void find_loads(struct rp_joint_loads *loads) {
-    const struct joint_loads found = loads_of_motion(arm_at(s.q, s.dq), s.tau, s.ddq);
-    write_loads(&found, loads);
+static struct joint_loads find_loads(void) {
+    return loads_of_motion(arm_at(s.q, s.dq), s.tau, s.ddq);
 }
 
 /* Bound of the terms of the accelerations of both links, and of the forces on them. */
@@ -208,7 +207,7 @@ static void test_link_motion_is_16_to_18(void) {
 }
 
 /* (20) and (22) to (25) with `coriolis` times q1' q2': 2 is right, the notes print 1. */
-static void loads_as_printed(double coriolis, struct rp_joint_loads *loads) {
+static struct joint_loads loads_as_printed(double coriolis) {
     double f2x = p.m2 * (L * ddq1 - p.a * dq1 * dq1 + coriolis * dq1 * dq2 + p.g * c1);
     double f2z = p.m2 * (-p.a * ddq1 - L * dq1 * dq1 + ddq2 + p.g * s1);
     double f1x = f2x + p.m1 * (p.lc1 * ddq1 + p.g * c1);
@@ -217,24 +216,21 @@ static void loads_as_printed(double coriolis, struct rp_joint_loads *loads) {
         p.m2 * (q2 * L * ddq1 - q2 * p.a * dq1 * dq1 + coriolis * q2 * dq1 * dq2 + q2 * p.g * c1) +
         p.I2z * ddq1;
     double tau1 = tau2 + p.lc1 * f1x - (p.lc1 - p.l1) * f2x - p.a * f2z + p.I1z * ddq1;
-    *loads = (struct rp_joint_loads){.f1 = {f1x, 0.0, f1z},
-                                     .tau1 = {0.0, tau1, 0.0},
-                                     .f2 = {f2x, 0.0, f2z},
-                                     .tau2 = {0.0, tau2, 0.0}};
+    return (struct joint_loads){.f1 = {f1x, 0.0, f1z},
+                                .tau1 = {0.0, tau1, 0.0},
+                                .f2 = {f2x, 0.0, f2z},
+                                .tau2 = {0.0, tau2, 0.0}};
 }
 
 static void test_joint_loads_are_19_to_25(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        struct rp_joint_loads loads, expected;
         next_sample();
-        memset(&loads, 0xff, sizeof loads);
-        find_loads(&loads);
-        loads_as_printed(2.0, &expected);
+        const struct joint_loads loads = find_loads(), expected = loads_as_printed(2.0);
         double force = 16 * EPS * force_scale(), moment = 16 * EPS * moment_scale();
-        ASSERT_VECTOR(expected.f1[0], 0.0, expected.f1[2], loads.f1, force);
-        ASSERT_VECTOR(expected.f2[0], 0.0, expected.f2[2], loads.f2, force);
-        ASSERT_VECTOR(0.0, expected.tau1[1], 0.0, loads.tau1, moment);
-        ASSERT_VECTOR(0.0, expected.tau2[1], 0.0, loads.tau2, moment);
+        ASSERT_VECTOR(expected.f1.x, 0.0, expected.f1.z, OF(loads.f1), force);
+        ASSERT_VECTOR(expected.f2.x, 0.0, expected.f2.z, OF(loads.f2), force);
+        ASSERT_VECTOR(0.0, expected.tau1.y, 0.0, OF(loads.tau1), moment);
+        ASSERT_VECTOR(0.0, expected.tau2.y, 0.0, OF(loads.tau2), moment);
     }
 }
 
@@ -251,15 +247,14 @@ static void find_effort_scale(double scale[2]) {
 
 static void test_newton_euler_gives_the_generalized_forces_of_euler_lagrange(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        struct rp_joint_loads loads;
         double tau[2], scale[2];
         next_sample();
-        find_loads(&loads);
+        const struct joint_loads loads = find_loads();
         arm_inverse_dynamics(arm_at(s.q, s.dq), s.ddq, tau);
         find_effort_scale(scale);
-        ASSERT_CLOSE(tau[0], loads.tau1[1],
+        ASSERT_CLOSE(tau[0], loads.tau1.y,
                      fmin(16 * EPS * (moment_scale() + scale[0]), 1e-12 * scale[0]));
-        ASSERT_CLOSE(tau[1], loads.f2[2], 16 * EPS * scale[1]);
+        ASSERT_CLOSE(tau[1], loads.f2.z, 16 * EPS * scale[1]);
     }
 }
 
@@ -268,16 +263,15 @@ static void test_newton_euler_gives_the_generalized_forces_of_euler_lagrange(voi
 static void test_recursion_as_printed_is_short_of_14(void) {
     double largest = 0.0;
     for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        struct rp_joint_loads printed;
         double tau[2], scale[2];
         next_sample();
-        loads_as_printed(1.0, &printed);
+        const struct joint_loads printed = loads_as_printed(1.0);
         arm_inverse_dynamics(arm_at(s.q, s.dq), s.ddq, tau);
         find_effort_scale(scale);
         double missing = p.m2 * L * dq1 * dq2;
         double bound = 16 * EPS * (moment_scale() + scale[0]);
-        ASSERT_CLOSE(-missing, printed.tau1[1] - tau[0], bound);
-        ASSERT_CLOSE(tau[1], printed.f2[2], 16 * EPS * scale[1]);
+        ASSERT_CLOSE(-missing, printed.tau1.y - tau[0], bound);
+        ASSERT_CLOSE(tau[1], printed.f2.z, 16 * EPS * scale[1]);
         largest = fmax(largest, fabs(missing) / bound);
     }
     TEST_ASSERT_TRUE(largest > 1e9); /* far above the rounding */
