@@ -11,6 +11,10 @@ from tests.support.paths import EVERY, OF_FILES, ROOT
 
 # What may differ, and why: FMU, variable or path of another part, column; "*" is any
 EVENTS = "where a limit begins and ends is an event now"
+HOOK = "C by hand decides it, and may read everything"
+STATICS = "what holds a joint does not follow from its inertia"
+HELD = ("friction", "stop_force")
+SET_IN_C = ("mode", "stop_impulse")
 CHANGED: dict[tuple[str, str, str], str] = {
     ("RPActuator", "/", "attributes"): EVENTS,
     ("RPActuator", "/ModelExchange", "attributes"): EVENTS,
@@ -38,6 +42,26 @@ CHANGED: dict[tuple[str, str, str], str] = {
         (fmu, name, ""): "models of files with equations have it"
         for fmu in ("RPSensor", "RPTrajectory", "RPController")
         for name in ("event_count", "last_event_time", "max_events")
+    },
+    ("RPPlant", "*", "initial unknown"): HOOK,
+    **{("RPPlant", f"{name}{i}", "output"): HOOK for name in SET_IN_C for i in (1, 2)},
+    **{("RPPlant", f"{name}{i}", "output"): STATICS for name in HELD for i in (1, 2)},
+    **{
+        ("RPPlant", f"slip{i}_{side}", "event indicator"): STATICS
+        for i in (1, 2)
+        for side in ("forward", "backward")
+    },
+    **{
+        ("RPPlant", f"stop{i}_{kind}", "event indicator"): "without friction no joint is held"
+        for i in (1, 2)
+        for kind in ("lower", "upper", "push")
+    },
+    ("RPPlant", "impact_loss", "output"): HOOK,
+    ("RPPlant", "grasp_loss", "output"): HOOK,
+    **{
+        ("RPPlant", f"mode{i}", column): "it says which there are"
+        for i in (1, 2)
+        for column in ("min", "max")
     },
 }
 
