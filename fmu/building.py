@@ -110,9 +110,7 @@ def build(
     return entries
 
 
-def _libraries(
-    name: str, runtime: Runtime, work: Path, hook: Hook
-) -> dict[str, tuple[str, Path]]:
+def _libraries(name: str, runtime: Runtime, work: Path, hook: Hook) -> dict[str, tuple[str, Path]]:
     """Link the shared object for one platform; return name and file by the version of FMI."""
     folder = work / runtime.content["platform"]
     folder.mkdir()

@@ -8,7 +8,8 @@
  * moment about z0 that act on link 2 at the end effector, the origin of frame 2. Each feature is
  * off while its parameters are 0 or none.
  *
- * The structs of parameters, inputs and modes are made of rp_plant.toml. The equations are in rp_plant_equations.h; the functions here call them and leave out what is 0.
+ * The structs of parameters, inputs and modes are made of rp_plant.toml. The equations are in
+ * rp_plant_equations.h; the functions here call them.
  * All functions are pure and allocate nothing. */
 #pragma once
 

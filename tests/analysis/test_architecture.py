@@ -288,7 +288,7 @@ def project(tmp_path: Path) -> Path:
     for name in (
         "src/model/model.h", "src/integrator/ode.h", "src/integrator/method.h",
         "src/instance/instance.h", "src/instance/state.h", "fmu/fmi/fmi_instance.h",
-        "fmu/fmi2/fmi2_functions.h", "fmu/fmi3/fmi3_calls.h", "models/jet.h",
+        "fmu/fmi2/fmi2_functions.h", "fmu/fmi3/fmi3_calls.h", "models/real.h",
         "models/rp_manipulator/rp_manipulator.h", "models/rp_trajectory/motion.h",
         "models/rp_plant/rp_plant_model.h", "models/rp_plant/rp_plant.h",
         "fmu/generate.py", "rparm/unit.py", "models/rp_plant/references/make.py",

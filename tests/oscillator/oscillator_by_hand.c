@@ -1,7 +1,5 @@
 #include "oscillator_by_hand.h"
 
-#include "jet.h"
-
 #include <math.h>
 #include <stdio.h>
 
@@ -33,11 +31,11 @@ static enum status extend(const struct series_origin *origin, int first, int las
     const struct oscillator_values *values = origin->values;
     for (int k = first; k <= last; k++) {
         if (k > 0) {
-            row[X][k] = jet_integral(row[V], origin->time_scale, k);
-            row[V][k] = jet_integral(row[A], origin->time_scale, k);
+            row[X][k] = origin->time_scale / k * row[V][k - 1];
+            row[V][k] = origin->time_scale / k * row[A][k - 1];
         }
-        row[A][k] =
-            -values->omega * values->omega * row[X][k] + values->gain * jet_input(origin, 0, k);
+        const double u = k < SERIES_INPUT_LENGTH ? origin->inputs[0][k] : 0.0;
+        row[A][k] = -values->omega * values->omega * row[X][k] + values->gain * u;
     }
     return STATUS_OK;
 }

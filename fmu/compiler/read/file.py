@@ -139,8 +139,9 @@ def _check_places(file: ModelFile) -> None:
     for variable in file.variables.values():
         with placed(variable.place, variable.name):
             if variable.field and not file.code:
-                raise ModelFileError("field: expected code above the first [section], which reads it")
-            if (other := where.setdefault(variable.field or variable.name, variable.name)) != variable.name:
+                raise ModelFileError("field: expected code above the sections, whose struct has it")
+            other = where.setdefault(variable.field or variable.name, variable.name)
+            if other != variable.name:
                 raise ModelFileError(f"field: {shown(variable.field)} is the place of {other}")
     for name in file.hook.indicators if file.hook else ():
         with placed("[hook]", "indicators"):

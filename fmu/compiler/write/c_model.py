@@ -10,15 +10,15 @@ from ..graph.curve import Curve
 from ..graph.graph import FALLIBLE, Value, is_number
 from ..names import Field
 from ..read.content import OPTIONS, ModelFile
+from . import c_hook
 from .c_code import Code
 from .c_events import Events, arrays, count, leaves, ticks
+from .c_hook import STRUCTURE
 from .c_series import Series
 from .c_text import declared, filled, indented, number, shortened, text
 from .loops import printed
 from .statements import Block, Operand, Place, Statement, field_of, store
 
-STRUCTURE = "struct equations_values"
-SYMBOL = "equations_model"
 BY_AVX2 = """
 BY_AVX2 static enum status extend_by_avx2(const struct series_origin *origin, int first, int last,
                                           double row[][SERIES_LENGTH]) {
@@ -33,16 +33,6 @@ static enum status extend(const struct series_origin *origin, int first, int las
 """
 LONG = 500  # lines for derivatives in small code: compilers need less time
 FOLLOWED = "relations_followed(&relations, ROOM, values, time, &copy)"
-
-
-def structure(file: ModelFile) -> str:
-    """Return the type of the value structure; with a hook that of NAME_values.h."""
-    return f"struct {file.path.stem}_values" if file.hook else STRUCTURE
-
-
-def symbol(file: ModelFile) -> str:
-    """Return the name of the struct model."""
-    return f"{file.path.stem}_model" if file.hook else SYMBOL
 
 
 def header(file: ModelFile) -> str:
@@ -81,7 +71,7 @@ def source(file: ModelFile) -> str:
         **_domains(file, events, series, has_domains, smooth["jacobian_size"]),
         "events": events.functions("_in_domain" * has_domains),
         "checks": _checks(file),
-        **_hooked(file),
+        **c_hook.parts(file, _ranges(file)),
     }
     written = filled(
         "equations.c.in",
@@ -90,63 +80,19 @@ def source(file: ModelFile) -> str:
         followed=_modes_of(file, events),
         expressions=_expressions(file),
         ranges=[
-            *(_hooked_parameters(file) if file.hook else _parameter_lines(file)),
+            *(c_hook.parameters(file) if file.hook else _parameter_lines(file)),
             *_range_lines({k: v for k, v in _ranges(file).items() if k != "parameters"}),
         ],
-        model_events=_model_events(file, events),
+        model_events=[f".events = &{c_hook.events(file)},"] if events else [],
     )
-    for common, own in ((STRUCTURE, structure(file)), (SYMBOL, symbol(file))):
-        written = written.replace(common, own)
-    return written
-
-
-def _model_events(file: ModelFile, events: Events) -> list[str]:
-    name = f"{file.path.stem}_events" if file.hook else "events"
-    return [f".events = &{name},"] if events else []
+    return c_hook.with_own_names(file, written)
 
 
 def _modes_of(file: ModelFile, events: Events) -> list[str]:
     """Statements that let `values` have the modes in effect."""
     if file.hook:
-        places = (file.fields.value(file.of(section)[0].name) for section in ("states", "inputs"))
-        state, of_input = (f"&values->{place}" for place in places)
-        return _in_effect(file, state, of_input)
+        return c_hook.modes_of_values(file)
     return [f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else []
-
-
-def _in_effect(file: ModelFile, state: str, of_input: str) -> list[str]:
-    call = f"{file.path.stem}_in_effect(values, {state}, {of_input}, &copy)"
-    return [f"{STRUCTURE} copy;", f"values = {call};"]
-
-
-def _hooked(file: ModelFile) -> dict[str, list[str]]:
-    """Return what C by hand adds."""
-    if not file.hook:
-        return dict.fromkeys(("modes", "modes_of_origin", "further_checks", "contiguous"), [])
-    origin = [
-        f"const double state[] = {{{', '.join(f'row[{i}][0]' for i in range(len(file.of('states'))))}}};",
-        f"const double input[] = {{{', '.join(f'origin->inputs[{i}][0]' for i in range(len(file.of('inputs'))))}}};",
-    ]
-    contiguous = []
-    for fields in (_ranges(file)[key] for key in ("inputs", "states", "dx")):
-        ends = [f"offsetof({STRUCTURE}, {field})" for field in (fields[0], fields[-1])]
-        size = f"{len(fields) - 1} * sizeof(double)"
-        contiguous.append(f'_Static_assert({ends[1]} - {ends[0]} == {size}, "fields side by side");')
-    return {
-        "modes": _in_effect(file, "state", "input"),
-        "modes_of_origin": [*origin, *_in_effect(file, "state", "input")],
-        "further_checks": [
-            f"if (!{file.path.stem}_check(values, text, size)) {{",
-            "    return STATUS_INVALID_PARAMETERS;",
-            "}",
-        ],
-        "contiguous": contiguous,
-    }
-
-
-def _hooked_parameters(file: ModelFile) -> list[str]:
-    size = f"sizeof(struct {file.path.stem}_parameters)"
-    return [f".parameters = {{offsetof({STRUCTURE}, parameters), {size}}},"]
 
 
 def _expressions(file: ModelFile) -> list[str]:

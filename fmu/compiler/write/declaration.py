@@ -15,7 +15,7 @@ from ..names import Field
 from ..read.content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
 from ..read.keys import NUMBERS
 from ..units import STANDARD, parsed, shown
-from . import c_events, c_model
+from . import c_events, c_hook, c_model
 
 INSTANCE = Path(__file__).resolve().parents[3] / "src" / "instance"
 TIME = INSTANCE / "time_variable.toml"
@@ -114,8 +114,8 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
         "name": file.name,
         "description": file.description or file.name,
         "header": "equations.h",
-        "values": c_model.structure(file),
-        "symbol": c_model.symbol(file),
+        "values": c_hook.structure(file),
+        "symbol": c_hook.symbol(file),
         "event_indicators": file.hook.indicators if file.hook else [*indicators],
         "naming": "structured" if any("[" in name for name, _ in keys(file)) else "flat",
         "flat": flat(file),
