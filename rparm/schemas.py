@@ -6,7 +6,8 @@ What a schema cannot say, such as which variables a model has, is left to those 
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +15,10 @@ from rparm import project
 from rparm.building import NEEDED
 from rparm.errors import UserError, one_line
 from rparm.files import write_text, written
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS
-from rparm.runs import scenario
-from rparm.runs.inputs import BESIDE, CONSTANT, FILE, MEASURED, SINE, SINES, TABLE
-from rparm.systems import loop_file
-from rparm.units import NUMBER
 
 Schema = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-TEXT = {"type": "string", "pattern": r"\S"}
-WITH_UNIT = rf"^\s*{NUMBER}[ \t]*([^\s\d.,+-]|1/)"
-QUANTITY = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": WITH_UNIT}]}
+TEMPLATES = Path(__file__).with_name("templates")
 
 
 def text(kind: str) -> str:
@@ -65,73 +59,14 @@ def _without_null(found: Any) -> Any:
     return {key: _without_null(value) for key, value in found.items() if value is not None}
 
 
-def _input() -> Schema:
-    signal = {"anyOf": [*QUANTITY["anyOf"], {"type": "boolean"}]}
-    row = {"type": "array", "prefixItems": [QUANTITY, signal], "minItems": 2, "maxItems": 2}
-    shapes = {CONSTANT: signal, TABLE: _list(row), FILE: TEXT}
-    shapes[SINES] = _list(_table(dict.fromkeys((*SINE[0], *SINE[1]), QUANTITY), SINE[0]))
-    beside = dict.fromkeys(BESIDE, QUANTITY) | dict.fromkeys(("column", "time"), TEXT)
-    beside["hold"] = {"type": "boolean"}
-    one = {"oneOf": [{"required": [shape]} for shape in shapes]}
-    one |= {"dependentRequired": {key: [shape] for key, shape in BESIDE.items()}}
-    return _table(shapes | beside) | one
-
-
-def _of_scenarios() -> Schema:
-    given = _input()["properties"]
-    of_file = {key: given[key] for key, shape in BESIDE.items() if shape == FILE}
-    length = {"if": {"type": "number"}, "then": {"exclusiveMinimum": 0}} | QUANTITY
-    times = dict.fromkeys(scenario.TIMES, QUANTITY) | {"step": {"anyOf": [length, _list(length)]}}
-    keys = {
-        **dict.fromkeys(("title", "description", scenario.MODEL, scenario.FMU), TEXT),
-        "tolerance": {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1},
-        "reference_every": {"type": "integer", "minimum": 1},
-        "panels": _list(_list({"type": "string"})),
-        "time": _table(times, scenario.TIMES),
-        **dict.fromkeys((PARAMETERS, INITIAL), _by_name({"type": ["number", "string", "boolean"]})),
-        INPUTS: _by_name(_input()),
-        MEASURED: _by_name(_table({FILE: TEXT} | of_file, [FILE])),
-    }
-    known = {key: keys[key] for key in (*scenario.REQUIRED, *scenario.OPTIONAL)}
-    both = {"not": {"required": [scenario.MODEL, scenario.FMU]}}
-    return {"$schema": DIALECT, "title": "Scenario"} | _table(known, scenario.REQUIRED) | both
-
-
-def _of_loops() -> Schema:
-    def of_variables(entry: Schema) -> Schema:
-        """By component.variable, or in a table by component."""
-        return _by_name({"anyOf": [entry, _by_name(entry)]})
-
-    value = {"type": ["number", "string", "boolean", "array"]}
-    times = dict.fromkeys(loop_file.TIMES, QUANTITY)
-    times["step"] = {"if": {"type": "number"}, "then": {"exclusiveMinimum": 0}} | QUANTITY
-    keys = {
-        "name": {"type": "string", "pattern": f"^{loop_file.NAME.pattern}$"},
-        "description": TEXT,
-        loop_file.KEEP: _list({"type": "string", "pattern": r"\."}),
-        loop_file.COMPONENTS: _by_name(TEXT),
-        loop_file.CONNECTIONS: of_variables({"type": "string", "pattern": r"\."}),
-        INPUTS: of_variables(_input()),
-        PARAMETERS: of_variables(value),
-        loop_file.VARIANTS: _by_name(of_variables(value) | {"properties": {"description": TEXT}}),
-    }
-    head = {"$schema": DIALECT, "title": "System"}
-    return head | _table(times | keys, loop_file.REQUIRED)
-
-
-def _list(item: Schema) -> Schema:
-    return {"type": "array", "items": item, "minItems": 1}
-
-
-def _table(properties: Schema, required: Iterable[str] = ()) -> Schema:
-    found = {"type": "object", "properties": properties, "additionalProperties": False}
-    return found | {"required": [*required]}
-
-
-def _by_name(entry: Schema) -> Schema:
-    return {"type": "object", "additionalProperties": entry}
+def _of_file(name: str) -> Schema:
+    """Read a schema, and what both have of values."""
+    schema = json.loads((TEMPLATES / f"{name}.schema.json").read_text(encoding="utf-8"))
+    shared = json.loads((TEMPLATES / "values.schema.json").read_text(encoding="utf-8"))
+    return schema | {"$defs": shared | schema["$defs"]}
 
 
 KINDS: dict[str, Callable[[], Schema]] = {
-    "model": _of_models, "scenario": _of_scenarios, "campaign": _of_campaigns, "loop": _of_loops,
+    "model": _of_models, "scenario": partial(_of_file, "scenario"), "campaign": _of_campaigns,
+    "loop": partial(_of_file, "loop"),
 }  # fmt: skip

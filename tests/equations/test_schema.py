@@ -9,12 +9,15 @@ from collections.abc import Iterator
 from functools import cache, reduce
 from operator import getitem
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
 
 from rparm import schemas
+from rparm.runs import inputs, scenario
+from rparm.systems import loop_file
 from tests.campaign.test_campaign_file import MISTAKES as OF_CAMPAIGNS
 from tests.campaign.test_campaign_file import wrong
 from tests.closed_loop.test_loop_file import TABLES as OF_LOOPS
@@ -69,6 +72,15 @@ def test_files_of_the_project_are_valid(kind: str) -> None:
     for path in FILES[kind]:
         found = validator(kind).iter_errors(tomllib.loads(path.read_text(encoding="utf-8")))
         assert [f"{path.name}: {error.json_path}: {error.message}" for error in found] == []
+
+
+@pytest.mark.parametrize(("kind", "reader"), [("scenario", scenario), ("loop", loop_file)])
+def test_keys_are_those_that_the_reader_takes(kind: str, reader: ModuleType) -> None:
+    schema = json.loads(schemas.text(kind))
+    assert set(schema["properties"]) == {*reader.REQUIRED, *reader.OPTIONAL}
+    assert schema["required"] == [*reader.REQUIRED]
+    shapes = inputs.CONSTANT, inputs.SINES, inputs.TABLE, inputs.FILE
+    assert set(schema["$defs"]["input"]["properties"]) == {*shapes, *inputs.BESIDE}
 
 
 def test_mistakes_that_show_without_meaning_are_refused(tmp_path: Path) -> None:
