@@ -2,9 +2,10 @@
 
 import argparse
 import base64
-import html
 import sys
 from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader
 
 PAGE = Path(__file__).parent / "page"
 SHARED = Path(__file__).parents[1] / "rparm" / "report" / "assets"  # of the report, too
@@ -24,48 +25,32 @@ SCRIPTS = (
 LARGEST = 1_500_000  # bytes
 
 
-def element(name: str, kind: str, text: str) -> str:
-    """Text for the scripts: a script element that no browser runs."""
-    if "</script" in text.lower():
-        raise ValueError(f"{name}: the text would end the element that holds it")
-    return f'<script type="text/plain" id="{name}-{kind}">{text}</script>'
+def parts(module: Path) -> tuple[str, str, str]:
+    """Return name, description and code of an FMU; the description lies beside the module.
+
+    They are the texts of script elements that no browser runs.
+    """
+    description = module.with_name("modelDescription.xml").read_text()
+    if "</script" in description.lower():
+        raise ValueError(f"{module.stem}: the text would end the element that holds it")
+    return module.stem, description, base64.b64encode(module.read_bytes()).decode()
 
 
-def data(fmus: dict[str, Path]) -> str:
-    """Elements with module and description of each FMU; the description lies beside the module."""
-    elements = []
-    for name, module in fmus.items():
-        description = module.with_name("modelDescription.xml").read_text()
-        elements.append(element(name, "description", description))
-        elements.append(element(name, "module", base64.b64encode(module.read_bytes()).decode()))
-    return "\n".join(elements)
-
-
-def joined(paths: tuple[Path, ...]) -> str:
-    return "\n".join(path.read_text() for path in paths)
-
-
-def notices(licenses: list[str]) -> str:
-    """Return the licenses of the code in the modules, each given as NAME=FILE."""
-    texts = []
-    for name, _, path in (entry.partition("=") for entry in licenses):
-        texts.append(
-            f"<h3>{html.escape(name)}</h3>\n<pre>{html.escape(Path(path).read_text())}</pre>"
-        )
-    return "\n".join(texts)
-
-
-def page(fmus: dict[str, Path], licenses: list[str]) -> str:
-    text = (PAGE / "page.html").read_text()
-    parts = {
-        "@styles@": joined(STYLES),
-        "@scripts@": joined(SCRIPTS),
-        "@licenses@": notices(licenses),
-        "@data@": data(fmus),
-    }
-    for mark, part in parts.items():
-        text = text.replace(mark, part)
-    return text
+def page(modules: list[Path], licenses: list[str]) -> str:
+    """Return the page; licenses, of the code in the modules, are each given as NAME=FILE."""
+    templates = Environment(
+        loader=FileSystemLoader(PAGE),
+        autoescape=True,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+    )
+    named = [entry.split("=", 1) for entry in licenses]
+    return templates.get_template("page.html").render(
+        styles=[path.read_text() for path in STYLES],
+        scripts=[path.read_text() for path in SCRIPTS],
+        licenses=[(name, Path(path).read_text()) for name, path in named],
+        fmus=[parts(module) for module in modules],
+    )
 
 
 def main() -> int:
@@ -76,8 +61,7 @@ def main() -> int:
     )
     parser.add_argument("--output", required=True, type=Path, help="page to write")
     arguments = parser.parse_args()
-    fmus = {module.stem: module for module in arguments.modules}
-    written = page(fmus, arguments.license).encode()
+    written = page(arguments.modules, arguments.license).encode()
     if len(written) > LARGEST:
         print(f"build.py: the page has {len(written)} bytes, more than {LARGEST}", file=sys.stderr)
         return 1

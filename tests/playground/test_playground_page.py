@@ -293,7 +293,7 @@ def test_the_page_holds_all_it_needs(module: Path) -> None:
     assert "<h3>Small &amp; Co</h3>\n<pre>Copyright &lt;someone&gt;</pre>" in page
     for script in (PROGRAM.parent / "page").glob("*.js"):
         assert script.read_text() in page, script.name
-    assert not any(mark in page for mark in ("@styles@", "@scripts@", "@data@", "@licenses@"))
+    assert not any(mark in page for mark in ("{{ styles", "{{ scripts", "{% for", "{{ name"))
     assert "src=" not in page
 
 
