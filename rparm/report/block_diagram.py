@@ -4,24 +4,12 @@ Signals between neighbors run straight; those that go back, or far, take a lane 
 """
 
 from collections.abc import Mapping, Sequence
-from xml.sax.saxutils import escape
 
 from rparm.systems.structure import OpenedSystem
+from rparm.texts import rendered
 
 HEIGHT, APART, LANE, CHANNEL, LETTER = 64, 30, 26, 12, 7  # px; the last one: width of a letter
 MOST_NAMED = 4  # signals of a line
-HEAD = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}"
-     height="{height}" role="img" aria-label="{label}">
-<style>
-text {{ font: 13px "Liberation Sans", Arial, Helvetica, sans-serif; fill: #222 }}
-.block, .unit {{ text-anchor: middle }} .block {{ font-weight: bold }} .unit {{ fill: #5a6675 }}
-rect {{ fill: #c9d4e3; stroke: #2b3440; stroke-width: 1.6 }}
-path {{ fill: none; stroke: #2b3440; stroke-width: 1.8; marker-end: url(#tip) }}
-</style>
-<marker id="tip" viewBox="0 0 10 8" refX="9" refY="4" markerWidth="10" markerHeight="8"
-    orient="auto" markerUnits="userSpaceOnUse">
-<polygon points="0 0 10 4 0 8" fill="#2b3440"/></marker>
-"""
 Pair = tuple[str, str]  # components at the start and the end of signals
 
 
@@ -96,19 +84,17 @@ class _Picture:
         return self.begin[gap] + CHANNEL * (place + 1)
 
     def svg(self) -> str:
-        parts = [self._line(pair, text) for pair, text in self.labels.items()]
-        for name, unit in self.blocks.items():
-            x, y, middle = self.x[name], self.y[name], self.x[name] + self.wide[name] // 2
-            parts.append(
-                f'<rect x="{x}" y="{y}" width="{self.wide[name]}" height="{HEIGHT}" rx="4"/>\n'
-                f'<text class="block" x="{middle}" y="{y + 27}">{escape(name)}</text>\n'
-                f'<text class="unit" x="{middle}" y="{y + 47}">{escape(unit)}</text>\n'
-            )
-        label = escape(", ".join(self.blocks), {'"': "&quot;"})
+        blocks = [
+            {"name": name, "unit": unit, "x": self.x[name], "y": self.y[name],
+             "width": self.wide[name], "height": HEIGHT}
+            for name, unit in self.blocks.items()
+        ]  # fmt: skip
+        lines = [(*self._line(pair), text) for pair, text in self.labels.items()]
         height = self.bottom + LANE * len(self.lanes) + 10
-        return HEAD.format(width=self.width, height=height, label=label) + "".join(parts) + "</svg>"
+        return rendered("blocks.svg", width=self.width, height=height, blocks=blocks, lines=lines)
 
-    def _line(self, pair: Pair, text: str) -> str:
+    def _line(self, pair: Pair) -> tuple[str, tuple[int, int]]:
+        """Return the path of a line, and where its text begins."""
         start, end = pair
         left, right = self.x[end], self.x[start] + self.wide[start] if start else 10
         leaves, enters = self._port(pair, 0), self._port(pair, 1)
@@ -116,10 +102,7 @@ class _Picture:
         if pair in self.lanes:
             y = self.bottom + LANE * (self.lanes.index(pair) + 1) - 8
             first = self._vertical(pair, self.layer[start] + 1, last=False)
-            path = f"M{right} {leaves} H{first} V{y} H{x} V{enters} H{left}"
             verticals = min(self.layer[start] + 1, self.layer[end])
             place = self.begin[verticals] + CHANNEL * (len(self.verticals[verticals]) + 1), y - 5
-        else:
-            path, place = f"M{right} {leaves} H{x} V{enters} H{left}", (right + 6, leaves - 5)
-        label = f'<text x="{place[0]}" y="{place[1]}">{escape(text)}</text>\n'
-        return f'<path d="{path}"/>\n{label}'
+            return f"M{right} {leaves} H{first} V{y} H{x} V{enters} H{left}", place
+        return f"M{right} {leaves} H{x} V{enters} H{left}", (right + 6, leaves - 5)
