@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 from xml.sax.saxutils import quoteattr
@@ -11,10 +12,17 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rparm import files, units
 
 NUMERIC = re.compile(r"-?\d[\d.]*(e[+-]?\d+)?( m?s)?|nan|–")  # of cells aligned to the right
+LISTED = 12  # names in a sentence
 
 
 class Command(str):
     """Command to type, as a cell of a table."""
+
+
+def listed(names: Sequence[str]) -> str:
+    """Name the first of them, and how many more there are."""
+    more = len(names) - LISTED
+    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 _templates = Environment(
@@ -27,7 +35,9 @@ _templates = Environment(
 )
 _templates.filters |= {
     "address": lambda path: quote(os.fsencode(path)),
+    "duration": units.duration,
     "exponents": units.exponents,
+    "listed": listed,
     "minus": units.minus,
     "number": units.number,
     "quoted": lambda text: quoteattr(str(text)),

@@ -24,11 +24,11 @@ from rparm.linearization.responses import bounded_response, frequencies, frequen
 from rparm.linearization.study import Study
 from rparm.report import pages
 from rparm.report.charts import Chart, Data
+from rparm.texts import listed, rendered
 from rparm.units import duration, exponents, unit
 
 Part = tuple[pages.PageTable, str, list[Chart]]
 NONE = "–"
-LISTED = 12  # names in a sentence
 REAL = 1e-6  # of a pole: a smaller real or imaginary part is rounding, as of poles that are equal
 TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 MARGINS, STEPS, EQUILIBRIUM = (TEXTS[name] for name in ("margins", "steps", "equilibrium"))
@@ -113,76 +113,28 @@ def _not_drawn(linear: Linear, answers: np.ndarray) -> list[str]:
         (linear.inputs, 0, "inputs move no output"),
     ):
         if idle := [names[i] for i in np.flatnonzero(~answers.any(axis=axis))]:
-            texts.append(f"These {what} and are not in the charts: {_names(idle)}.")
+            texts.append(f"These {what} and are not in the charts: {listed(idle)}.")
     return texts
 
 
 # ---- Tables and texts ----------------------------------------------------------------------------
 def notes(found: Study) -> list[str]:
-    """Say what has been left out, in a sentence each."""
-    linear, texts = found.linear, []
-    if found.python:
-        steps = "the communication step"
-        if linear.dt > 1.5 * found.step:
-            steps = f"the common period of steps of {duration(found.step)} and samplers"
-        texts.append(
-            f"Sampled every {duration(linear.dt)}, {steps}, because of Python: "
-            f"{_names(found.python)}. States are those at its begin; inputs are held over it."
-        )
-    elif linear.dt:
-        every = {tick.name: tick.every for tick in linear.ticks}
-        why = f" by {_names(list(every))}"
-        if min(every.values()) < linear.dt / 1.5:
-            rates = [f"{name} ({duration(time)})" for name, time in every.items()]
-            why = f", the common period of {_names(rates)}, which a tick of the slowest begins"
-        texts.append(
-            f"Sampled every {duration(linear.dt)}{why}. States are those just before the "
-            "first tick of a period, outputs those just after it; inputs are held in between."
-            + (" Connections act at once: not a communication step late." if found.variant else "")
-        )
-    if linear.held:
-        texts.append(
-            f"Held: {_names(linear.held)}. They do not respond to small changes of the inputs, "
-            "because of friction, a stop or a gain of 0, and are left out."
-        )
-    if linear.left_out:
-        texts.append(f"Left out, as they are discrete: {_names(linear.left_out)}.")
-    if linear.flat:
-        texts.append(
-            f"Without slope: {_names(linear.flat)}. These functions stay as they are at the point: "
-            "a loop through them looks open."
-        )
-    if linear.uneven:
-        texts.append(
-            f"Not the same in every step: {_names(linear.uneven)}. The model takes it as in the "
-            "step at the point: margins are those of a law that always acts so."
-        )
-    if found.loop is not None and found.loop.dropped:
-        texts.append(
-            f"Not in the loop: {_names(found.loop.dropped)}. The break does not move them, or they "
-            "do not come back to it, or others stand for them."
-        )
-        if len(rates := growing(found.loop)):
-            fastest = _short(float(rates.real.max()))
-            texts.append(f"They grow by e^({fastest} t) whatever the loop does.")
-        if len(rates := ringing(found.loop, found.loop.hidden)):
-            hertz = _short(float(np.abs(rates.imag).max()) / (2 * math.pi))
-            texts.append(f"They ring at {hertz} Hz for ever, once moved, whatever the loop does.")
-    if found.margins is not None and not found.margins.stable:
-        texts.append("The closed loop is unstable here: it has no margins.")
-    if found.moving and found.trimmed:
-        texts.append(f"In steady motion: {_names(found.moving)}.")
-    elif found.moving:
-        texts.append(
-            f"This is no equilibrium: {_names(found.moving)}. Deviations are those from the "
-            "motion that begins here; trim leads to an equilibrium."
-        )
-    return texts
-
-
-def _names(names: Sequence[str]) -> str:
-    more = len(names) - LISTED
-    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
+    """Say what has been left out, a text each."""
+    linear, loop = found.linear, found.loop
+    every = {tick.name: tick.every for tick in linear.ticks}
+    grow = ring = ()
+    if loop is not None and loop.dropped:
+        grow, ring = growing(loop), ringing(loop, loop.hidden)
+    text = rendered(
+        "linear_notes.txt",
+        found=found,
+        samplers=[*every],
+        rates=[f"{name} ({duration(time)})" for name, time in every.items()],
+        several_rates=min(every.values(), default=math.inf) < linear.dt / 1.5,
+        growing=_short(float(grow.real.max())) if len(grow) else None,
+        ringing=_short(float(np.abs(ring.imag).max()) / (2 * math.pi)) if len(ring) else None,
+    )
+    return text.splitlines()
 
 
 def point_table(found: Study) -> pages.PageTable:
