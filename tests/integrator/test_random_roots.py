@@ -4,12 +4,13 @@ import os
 import subprocess
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import pairwise
 from math import inf, nextafter
 from pathlib import Path
 
 import numpy as np
 import pytest
+from flint import ctx, fmpz_poly
 
 from tests.support.paths import ROOT
 
@@ -36,11 +37,6 @@ class Exact:
             scale *= below
         return value
 
-    def sign(self, s: float) -> int:
-        """-1, 0 or 1."""
-        value = self(s)
-        return (value > 0) - (value < 0)
-
     def size(self, s: float) -> float:
         """The value over the sum of the sizes of all terms."""
         terms = Exact(tuple(abs(c) for c in self.c))(s)
@@ -49,70 +45,28 @@ class Exact:
     def derivative(self) -> "Exact":
         return Exact(tuple(k * c for k, c in enumerate(self.c))[1:])
 
-    def closer(self, low: float, high: float) -> float:
-        """Where between two doubles the sign changes, to 10^-9."""
-        before = self.sign(low) or -self.sign(high)
-        while high - low > 1e-9:
-            middle = (low + high) / 2
-            if self.sign(middle) == before:
-                low = middle
-            else:
-                high = middle
-        return high
 
+def isolate(p: Exact) -> list[tuple[float, float, float]]:
+    """Real roots in (0, 1], and the ends of an interval about each with no other root in it.
 
-def changes(c: Sequence[int]) -> int:
-    """How often the coefficients of s^k (1 - s)^(n - k) change their sign."""
-    row, ends = list(c), []
-    while row:
-        row = list(accumulate(row))
-        ends.append(row.pop())
-    signs = [end > 0 for end in ends if end]
-    return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
-
-
-def right_half(c: Sequence[int]) -> list[int]:
-    """p(s + 1)."""
-    row, shifted = list(reversed(c)), []
-    while row:
-        row = list(accumulate(row))
-        shifted.append(row.pop())
-    return shifted
-
-
-def isolate(p: Exact, deepest: int = 120) -> list[tuple[float, float]]:
-    """Intervals with one root each, in their order: open ones, or the root twice.
-
-    Vincent, Collins and Akritas: halves are halved until Descartes' rule leaves one root or none.
-    An interval of width 2^-deepest counts as a root, too, of a multiple one.
+    A root of any multiplicity is one; intervals are as long as 2 FAR, less beside others, 0 at 1.
     """
-    found = []
-    c = list(p.c)
-    while c and c[0] == 0:
-        c.pop(0)
-    todo = [(c, 0, 0)]  # polynomial on (0, 1) for k 2^-depth + 2^-depth (0, 1)
-    while todo:
-        c, k, depth = todo.pop()
-        most = changes(c)
-        if most == 1 or (most > 1 and depth >= deepest):
-            found.append((k / 2**depth, (k + 1) / 2**depth))
-        elif most > 1:
-            n = len(c) - 1
-            left = [x << (n - i) for i, x in enumerate(c)]
-            right = right_half(left)
-            if right[0] == 0:
-                found.append(((2 * k + 1) / 2 ** (depth + 1),) * 2)
-            todo.append((left, 2 * k, depth + 1))
-            todo.append((right, 2 * k + 1, depth + 1))
-    if sum(p.c) == 0:
-        found.append((1.0, 1.0))
-    return sorted(found)
+    with ctx.workprec(BITS):
+        found = [root for root, _ in fmpz_poly([*p.c]).complex_roots() if root.imag == 0]
+        roots = sorted(root.real for root in found if 0 < root.real < 1)
+        gaps = [2 * FAR, *(b - a for a, b in pairwise(roots)), 2 * FAR]
+        reach = [min(gap / 2, FAR) for gap in gaps]
+        ends = [(max(x - reach[i], 0), x, min(x + reach[i + 1], 1)) for i, x in enumerate(roots)]
+        isolated = [tuple(map(float, each)) for each in ends]
+    return isolated + [(1.0, 1.0, 1.0)] * (sum(p.c) == 0)
 
 
 LENGTH = 32
 POLYNOMIALS = int(os.environ.get("ROOT_POLYNOMIALS", "7000"))  # long_random_roots has more
 FALLS, RISES, TOUCHES = range(3)
 U = 2.0**-53
+BITS = 300  # more than tell the roots apart
+FAR = 1e-6  # half of the longest interval about a root
 KNOWN = 2.0**-94  # part of the sum of the sizes of all terms: a sign beyond it is known
 
 
@@ -245,7 +199,7 @@ def wrong_count(p: Exact, c: np.ndarray, found: Found) -> Iterator[str]:
     """Roots that are missing or invented: each is in one of the intervals."""
     left = [root for root, kind in found.roots if kind != TOUCHES]
     touches = [root for root, kind in found.roots if kind == TOUCHES]
-    for low, high in isolate(p):
+    for low, _, high in isolate(p):
         here = [x for x in left if (low < x and nextafter(x, 0) < high) or low == x]
         if here:
             left.remove(here[0])
@@ -275,9 +229,8 @@ def test_extrema_within_rounding_are_roots(program: Path) -> None:
     for c, found in zip(given, find(program, given), strict=True):
         p = Exact.of(c)
         slope = p.derivative()
-        for low, high in isolate(slope):
-            s = slope.closer(low, high)
-            if 0 < s <= 1 and abs(p.size(s)) < 0.99 * rounding(c):
+        for _, s, _ in isolate(slope):
+            if abs(p.size(s)) < 0.99 * rounding(c):
                 seen += 1
                 if not is_near(s, [root for root, _ in found.roots]):
                     missing.append((s, list(c), found))
