@@ -1,6 +1,6 @@
 /* Between initialization and Terminate an instance allocates memory only for FMU states. Steps, and
  * setting or getting values, allocate nothing, with any method and after any failure. */
-#include "allocations.h"
+#include "allocator.h"
 #include "each_method.h"
 #include "fmu_harness.h"
 #include "fmu_sequences.h"
@@ -43,7 +43,7 @@ static fmi2Status change_parameters(fmi2Component c, int i) {
 static void assert_steps_allocate_nothing(fmi2Component c, double start, change *change_values) {
     struct fmu_values values;
     fmi2Status status = fmi2OK;
-    const long before = allocation_count();
+    const long before = allocator_calls();
     for (int i = 0; i < 200 && status == fmi2OK; i++) {
         status = change_values(c, i);
         if (status == fmi2OK) {
@@ -53,17 +53,17 @@ static void assert_steps_allocate_nothing(fmi2Component c, double start, change 
             status = fmu_get_all(c, &values);
         }
     }
-    TEST_ASSERT_EQUAL_INT(before, allocation_count());
+    TEST_ASSERT_EQUAL_INT(before, allocator_calls());
     ASSERT_OK(status);
 }
 
 EACH_METHOD static void test_the_allocations_of_the_fmu_are_counted(void) {
-    const long before = allocation_count();
+    const long before = allocator_calls();
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
-    const long initialized = allocation_count();
+    const long initialized = allocator_calls();
     TEST_ASSERT_GREATER_THAN_INT(before, initialized);
     fmi2FMUstate state = fmu_save(c);
-    TEST_ASSERT_GREATER_THAN_INT(initialized, allocation_count());
+    TEST_ASSERT_GREATER_THAN_INT(initialized, allocator_calls());
     fmu_forget(c, &state);
 }
 
@@ -84,12 +84,12 @@ EACH_METHOD static void test_steps_and_values_allocate_nothing(void) {
 EACH_METHOD static void test_a_long_hold_allocates_nothing(void) {
     const double length = 20.0;
     const fmi2Component c = fmu_lasting(method, &messages);
-    const long before = allocation_count();
+    const long before = allocator_calls();
     fmi2Status status = fmi2OK;
     for (int i = 0; i < 2 && status == fmi2OK; i++) {
         status = fmu.DoStep(c, i * length, length, fmi2True);
     }
-    TEST_ASSERT_EQUAL_INT(before, allocation_count());
+    TEST_ASSERT_EQUAL_INT(before, allocator_calls());
     ASSERT_OK(status);
     TEST_ASSERT_GREATER_THAN_INT(1, fmu_get_integer(c, RP_MANIPULATOR_solver_restarts));
     assert_steps_allocate_nothing(c, 2.0 * length, change_nothing);
@@ -103,9 +103,9 @@ EACH_METHOD static void test_steps_after_a_rollback_allocate_nothing(void) {
         fmi2FMUstate state = fmu_save(source);
         struct fmu_bytes bytes = fmu_serialize(source, state);
         assert_steps_allocate_nothing(source, 200.0 * h, change_inputs);
-        const long before = allocation_count();
+        const long before = allocator_calls();
         const fmi2Status status = fmu.SetFMUstate(source, state);
-        TEST_ASSERT_EQUAL_INT(before, allocation_count());
+        TEST_ASSERT_EQUAL_INT(before, allocator_calls());
         ASSERT_OK(status);
         assert_steps_allocate_nothing(source, 200.0 * h, change_nothing);
 
@@ -123,12 +123,12 @@ EACH_METHOD static void test_what_is_refused_allocates_nothing(void) {
     const double not_a_number = NAN;
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
     fmi2FMUstate state = fmu_save(c);
-    const long before = allocation_count();
+    const long before = allocator_calls();
     const fmi2Status discarded = fmu.SetReal(c, &reference, 1, &not_a_number);
     const fmi2Status step_back = fmu.DoStep(c, -1.0, h, fmi2True);
     const fmi2Status in_error = fmu.DoStep(c, 0.0, h, fmi2True);
     const fmi2Status restored = fmu.SetFMUstate(c, state);
-    TEST_ASSERT_EQUAL_INT(before, allocation_count());
+    TEST_ASSERT_EQUAL_INT(before, allocator_calls());
     ASSERT_DISCARD(discarded);
     ASSERT_ERROR(step_back);
     ASSERT_ERROR(in_error);
@@ -147,10 +147,10 @@ EACH_METHOD static void test_a_step_that_fails_allocates_nothing(void) {
         assert_steps_allocate_nothing(c, 0.0, change_inputs);
         fmi2FMUstate state = fmu_save(c);
         fmu_set(c, RP_MANIPULATOR_tau1, overflows ? 1.7e308 : 1.0);
-        const long before = allocation_count();
+        const long before = allocator_calls();
         const fmi2Status failed = fmu.DoStep(c, 200.0 * h, 1000.0, fmi2True);
         const fmi2Status restored = fmu.SetFMUstate(c, state);
-        TEST_ASSERT_EQUAL_INT(before, allocation_count());
+        TEST_ASSERT_EQUAL_INT(before, allocator_calls());
         ASSERT_DISCARD(failed);
         ASSERT_OK(restored);
         assert_steps_allocate_nothing(c, 200.0 * h, change_inputs);

@@ -127,19 +127,9 @@ static void assert_refused(const struct pair *pair, fmi2Component c) {
     fmu_assert_in_state(c, fmi_state_of(pair->type, 'E'), 0.0, &messages, pair->text);
 }
 
-/* A state saved before a refused call undoes it. */
-static void assert_saved_state_leads_back(const struct pair *pair, fmi2Component c,
-                                          fmi2FMUstate saved) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.SetFMUstate(c, saved), pair->text);
-    fmu_assert_in_state(c, pair->state, 0.0, &messages, pair->text);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.SetFMUstate(c, saved), pair->text);
-    assert_refused(pair, c);
-}
-
 static void check(const struct pair *pair) {
     const char *states = allowed_states(pair->type, pair->function);
     TEST_ASSERT_NOT_NULL_MESSAGE(states, pair->text);
-    fmi2FMUstate saved = NULL;
     const fmi2Component c = fmu_reach(pair->type, pair->state, &messages);
     if (pair->function == FMU_FreeInstance) {
         (void)call(pair, c);
@@ -149,12 +139,9 @@ static void check(const struct pair *pair) {
     if (strchr(states, pair->state->letter) != NULL) {
         assert_works(pair, c);
     } else {
-        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.GetFMUstate(c, &saved), pair->text);
         assert_refused(pair, c);
-        assert_saved_state_leads_back(pair, c, saved);
     }
     fmu_assert_reset_is_fresh_as(pair->type, c, pair->text);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.FreeFMUstate(c, &saved), pair->text);
     fmu_free(c);
 }
 
