@@ -13,11 +13,11 @@ struct polynomial {
     double d[4];
 };
 
-/* Its integral of this order from 0 to s; 0: its value; negative: its derivative at s. */
+/* Its integral of this order from 0 to s; 0: its value. */
 static double integral(const struct polynomial *polynomial, int order, double s) {
     double sum = 0.0;
     for (int k = 0; k < 4; k++) {
-        double term = k + order < 0 ? 0.0 : polynomial->d[k];
+        double term = polynomial->d[k];
         for (int i = 1; i <= k + order; i++) {
             term *= s / i;
         }
@@ -244,40 +244,6 @@ static double output_derivative(fmi2Component c, fmi2ValueReference reference, f
     double value = NAN;
     ASSERT_OK(fmu.GetRealOutputDerivatives(c, &reference, 1, &order, &value));
     return value;
-}
-
-static void test_output_derivatives_of_the_slide(void) {
-    const double s = 0.5;
-    for (size_t i = 0; i < FORCES; i++) {
-        const struct polynomial *p = &forces[i];
-        const fmi2Component c = sliding(0.0);
-        set_polynomial(c, RP_MANIPULATOR_f2, p);
-        step(c, 0.0, s);
-        const double dq2 = fmu_get(c, RP_MANIPULATOR_dq2);
-        const double f = integral(p, 0, s);
-        const double f_dot = integral(p, -1, s);
-        const double f_dot_dot = integral(p, -2, s);
-        const struct {
-            fmi2ValueReference reference;
-            double first, second;
-        } expected[] = {
-            {RP_MANIPULATOR_q1, 0.0, 0.0},
-            {RP_MANIPULATOR_q2, dq2, f / slide_mass},
-            {RP_MANIPULATOR_dq2, f / slide_mass, f_dot / slide_mass},
-            {RP_MANIPULATOR_ddq2, f_dot / slide_mass, f_dot_dot / slide_mass},
-            {RP_MANIPULATOR_kinetic_energy, f * dq2, f_dot * dq2 + f * f / slide_mass},
-            {RP_MANIPULATOR_potential_energy, 0.0, 0.0},
-            {RP_MANIPULATOR_actuator_power, f_dot * dq2 + f * f / slide_mass,
-             f_dot_dot * dq2 + 3.0 * f_dot * f / slide_mass},
-        };
-        for (size_t j = 0; j < FMU_COUNT(expected); j++) {
-            TEST_ASSERT_DOUBLE_WITHIN(1e-10, expected[j].first,
-                                      output_derivative(c, expected[j].reference, 1));
-            TEST_ASSERT_DOUBLE_WITHIN(1e-10, expected[j].second,
-                                      output_derivative(c, expected[j].reference, 2));
-        }
-        fmu_free(c);
-    }
 }
 
 /* The whole arm, whose inputs move: against differences of order 8 of the outputs at steps that end

@@ -187,27 +187,6 @@ static void test_the_stop_time_itself_is_reached_within_slack(void) {
     }
 }
 
-static void test_the_start_time_does_not_matter(void) {
-    static const double starts[] = {0.0, -0.5, 1000.0, 1e6};
-    const double h = 1.0 / 128.0; // exact at each of the times
-    double expected[4];
-    for (size_t i = 0; i < FMU_COUNT(starts); i++) {
-        double x[4];
-        const fmi2Component c = fmu_initialized(&messages, starts[i]);
-        TEST_ASSERT_TRUE(starts[i] == fmu_get(c, RP_MANIPULATOR_time));
-        for (int step = 0; step < 128; step++) {
-            fmu_set(c, RP_MANIPULATOR_tau1, 3.0 * cos(0.1 * step));
-            ASSERT_OK(fmu.DoStep(c, starts[i] + step * h, h, fmi2True));
-        }
-        TEST_ASSERT_TRUE(starts[i] + 1.0 == fmu_get(c, RP_MANIPULATOR_time));
-        fmu_get_states(c, i == 0 ? expected : x);
-        for (size_t j = 0; i > 0 && j < 4; j++) {
-            TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected[j], x[j]);
-        }
-        fmu_free(c);
-    }
-}
-
 /* noSetFMUStatePriorToCurrentPoint is only a hint. */
 static void test_the_rollback_hint_changes_nothing(void) {
     static const fmi2Boolean hints[] = {fmi2True, fmi2False, 7};

@@ -154,12 +154,6 @@ static void test_errors_cannot_be_silenced(void) {
     fmu3.FreeInstance(loud);
 }
 
-static void test_an_unknown_category_is_an_error(void) {
-    static const fmi3String unknown[] = {"logEvents", "logNothing"};
-    ASSERT_ERROR(fmu3.SetDebugLogging(fmu3_co_simulation(NULL), true, 2, unknown));
-    fmu_assert_logged(&messages, "logNothing");
-}
-
 /* Called as fmi3LogMessageCallback. */
 static void free_instance(fmi3InstanceEnvironment environment, fmi3Status status,
                           fmi3String category, fmi3String message) {
