@@ -2,20 +2,16 @@
 In FMI 3.0's Co-Simulation the importer sees more or less of them, with and without event mode and
 early return in fmpy; the motion has the same bits.
 
-Rollback by every method: tests/models/test_every_fmu.py.
+Rollback: tests/models/test_every_fmu.py, and with events that are due tests/fuzz.
 """
 
 import random
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy.model_description import ModelDescription
 
 from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import (
@@ -31,14 +27,7 @@ from tests.rp_plant.fmu.plant_runs import (
     last_event,
     started,
 )
-from tests.support.instances import (
-    DISCARD,
-    Instance,
-    LoadedFmu,
-    instantiated,
-    set_value,
-    status_of,
-)
+from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 from tests.support.rparm_project import fmi3_fmu
 
 # stops that give way, one of them damped
@@ -214,91 +203,3 @@ def test_the_motion_has_the_same_bits(paths: dict[str, Path], motion: str, metho
             assert event_times <= set(result["time"])
         else:
             assert event_times.isdisjoint(result["time"][result["time"] > 0.0])
-
-
-# ---- Rollback --------------------------------------------------------------------------------
-
-
-class Plant:
-    """An instance that uses event mode and early return, in step mode."""
-
-    NAMES = ("time", "q1", "q2", "dq1", "dq2", "impact_loss", "stop_impulse2")
-
-    def __init__(self, fmu: Any, description: ModelDescription) -> None:
-        self.fmu = fmu
-        self.variables = {v.name: v for v in description.modelVariables}
-        self.reference = {name: v.valueReference for name, v in self.variables.items()}
-
-    def values(self) -> list[float]:
-        reals = self.fmu.getFloat64([self.reference[name] for name in self.NAMES])
-        names = ("mode1", "mode2", "event_count")
-        return [*reals, *self.fmu.getInt32([self.reference[name] for name in names])]
-
-    def update(self) -> None:
-        self.fmu.enterEventMode()
-        assert not any(self.fmu.updateDiscreteStates()[:-1])
-        self.fmu.enterStepMode()
-
-    def advance(self, target: float) -> bool:
-        """One step towards `target` (s); whether it ends at an event, which is due."""
-        time = self.values()[0]
-        has_event, terminates, early, reached = self.fmu.doStep(time, target - time)
-        assert reached == self.values()[0] and early == (reached < target) and not terminates
-        assert has_event or not early
-        return has_event
-
-    def step(self, target: float) -> None:
-        """Advance to `target` (s) or to an event, which is handled."""
-        if self.advance(target):
-            self.update()
-
-
-@contextmanager
-def in_step_mode(path: Path, **values: float) -> Iterator[Plant]:
-    options = {"early_return_allowed": True, "event_mode_used": True}
-    with instantiated(path, "CoSimulation", **options) as (fmu, description):
-        plant = Plant(fmu, description)
-        fmu.enterInitializationMode(startTime=0.0, tolerance=1e-8)
-        for name, value in values.items():
-            set_value(fmu, plant.variables[name], value)
-        fmu.exitInitializationMode()
-        fmu.updateDiscreteStates()
-        fmu.enterStepMode()
-        yield plant
-
-
-@each_method
-def test_rollback_over_events_that_are_due(paths: dict[str, Path], method: str) -> None:
-    """Saved at any time, also before fmi3UpdateDiscreteStates; all that follows is the same."""
-    chance = random.Random(15)
-
-    def disturb(plant: Plant) -> None:
-        """Go on for a while, and back."""
-        state = plant.fmu.getFMUState()
-        before = plant.values()
-        if chance.random() < 0.3:
-            plant.update()
-        for _ in range(chance.randrange(3)):
-            plant.step(plant.values()[0] + chance.choice([1e-3, 0.02, 0.3]))
-        plant.fmu.setFMUState(state)
-        plant.fmu.freeFMUState(state)
-        assert plant.values() == before
-
-    def run(disturb: Callable[[Plant], None]) -> list[list[float]]:
-        seen = []
-        with in_step_mode(paths["fmi3"], solver_method=METHODS[method], **motion) as plant:
-            for point in np.arange(1, 16) * 0.1:
-                while plant.values()[0] < point:
-                    disturb(plant)
-                    has_event = plant.advance(point)
-                    seen.append(plant.values())
-                    disturb(plant)
-                    if has_event:
-                        plant.update()
-                        seen.append(plant.values())
-        return seen
-
-    motion = MOTIONS["both joints"]
-    expected = run(lambda _: None)
-    assert expected[-1][-1] > 20  # events
-    assert run(disturb) == expected

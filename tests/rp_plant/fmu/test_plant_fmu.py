@@ -1,10 +1,5 @@
-"""RPPlant beside RPManipulator: the same interface, and with start values the same bits; its values
-against its Lagrangian."""
-
-import xml.etree.ElementTree as ET
-from dataclasses import replace
-from pathlib import Path
-from zipfile import ZipFile
+"""RPPlant beside RPManipulator: with start values the same bits; its values against its
+Lagrangian. Their interfaces: tests/models/test_published_interface.py."""
 
 import numpy as np
 import pytest
@@ -25,41 +20,6 @@ COUNTS = (
     "solver_last_order",
 )
 POINTS = 40
-INDICATORS = [
-    kind
-    for i in (1, 2)
-    for kind in (f"slip{i}_forward", f"slip{i}_backward", f"stop{i}_lower", f"stop{i}_upper")
-] + ["stop1_push", "stop2_push"]
-
-
-# ---- Interface -------------------------------------------------------------------------------
-
-
-def test_every_variable_of_the_arm_is_there(plant: Fmu, arm: Fmu) -> None:
-    """With its value reference, type, unit, start value and limits; some mean more here."""
-    for name, variable in arm.model.variables.items():
-        known = replace(plant.model.variables[name], description=variable.description)
-        assert known == variable
-    further = set(plant.model.variables) - set(arm.model.variables)
-    solver = {"event_count", "last_event_time", "max_events"}
-    references = {name: plant.model.variables[name].reference for name in further}
-    assert {references[name] for name in solver} == {93, 94, 95}
-    assert min(references[name] for name in further - solver) == 100
-
-
-def test_states_may_jump_and_indicators_are_counted(plant: Fmu) -> None:
-    with ZipFile(plant.path) as archive:
-        root = ET.fromstring(archive.read("modelDescription.xml"))
-    variables = {v.get("name"): v for v in root.find("ModelVariables")}
-    if plant.model.fmi_version == "2.0":
-        assert root.get("numberOfEventIndicators") == "10"
-        jump = [name for name, v in variables.items() if v[0].get("reinit") == "true"]
-    else:
-        found = root.iterfind("ModelStructure/EventIndicator")
-        names = {v.get("valueReference"): name for name, v in variables.items()}
-        assert [names[e.get("valueReference")] for e in found] == INDICATORS
-        jump = [name for name, v in variables.items() if v.get("reinit") == "true"]
-    assert jump == ["q1", "q2", "dq1", "dq2"]
 
 
 # ---- Start values ----------------------------------------------------------------------------
@@ -122,23 +82,3 @@ def test_values_are_those_of_lagrange_and_newton(fmi2_plant: Fmu, mode: str) -> 
         expected = np.array([*exact.values()])
         largest = np.abs(expected) + np.abs(expected).max()
         np.testing.assert_array_less(np.abs(found - expected), 1e-13 * largest, str((mode, seed)))
-
-
-# ---- Terminals -------------------------------------------------------------------------------
-
-
-def test_terminals_fit_those_of_the_arm(fmu: Path) -> None:
-    """The joints have the same members; the end effector takes a wrench, too."""
-    members = {}
-    for name in ("RPPlant", "RPManipulator"):
-        with ZipFile(fmu.parent / "fmi3" / f"{name}.fmu") as archive:
-            root = ET.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
-        members[name] = {
-            terminal.get("name"): {
-                m.get("variableName") for m in terminal.iter() if "variableName" in m.attrib
-            }
-            for terminal in root.find("Terminals")
-        }
-    plant, arm = members.values()
-    assert plant["arm"] == arm["arm"]
-    assert plant["end_effector"] > arm["end_effector"] | {"ee_fx", "ee_mz"}
