@@ -105,9 +105,9 @@ def test_a_choice_that_the_block_around_it_has_made_is_gone() -> None:
     square, other = graph.value("*", x, x), graph.value("+", x, x)
     inner = graph.value("if", is_low, graph.value("if", is_high, other, square), zero)
     value = graph.value("if", both, graph.value("sin", inner), zero)
-    targets, became = settled({"y": value, "z": other}, Conditions(graph))
-    assert targets["y"] is graph.value("if", both, graph.value("sin", square), zero)
-    assert became[inner] is square and targets["z"] is other
+    became = settled([value, other], Conditions(graph))
+    assert became[value] is graph.value("if", both, graph.value("sin", square), zero)
+    assert became[inner] is square and became[other] is other
 
 
 # ---- Derivatives ---------------------------------------------------------------------------------

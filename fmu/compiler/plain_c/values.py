@@ -4,7 +4,7 @@ A whole number is an int, a table over an integer leaf, or a choice. What is kno
 the text resolves conditions: a mode that is 2 is not 3.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -137,10 +137,24 @@ class Conditions:
 
     def _compare(self, op: str, leaf: Value, number: int) -> Value:
         condition = self.graph.value(op, leaf, self.graph.number(float(number)))
-        if leaf in self.domains:
-            holds = frozenset(v for v in self.domains[leaf] if RELATION[op](v, number))
-            self.members[condition] = (leaf, holds)
+        self.learn([condition])
         return condition
+
+    def learn(self, values: Iterable[Value]) -> None:
+        """Note which conditions hold where a leaf is one of some values."""
+        for value in values:
+            if value.op in RELATION:
+                (leaf, number), op = value.arguments, value.op
+                if leaf.op == "number":
+                    leaf, number, op = number, leaf, MIRRORED[op]
+                if leaf in self.domains and number.op == "number":
+                    holds = (v for v in self.domains[leaf] if RELATION[op](v, number.number))
+                    self.members[value] = leaf, frozenset(holds)
+            elif value.op in ("and", "or"):
+                one, other = map(self._membership, value.arguments)
+                if one and other and one[0] is other[0]:
+                    holds = one[1] & other[1] if value.op == "and" else one[1] | other[1]
+                    self.members[value] = one[0], holds
 
     # ---- What is known ---------------------------------------------------------------------------
 

@@ -1,17 +1,26 @@
-"""Values of a graph as statements with `if` blocks."""
+"""Choices of a graph as `if` blocks; what only one branch needs is calculated there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 from ..expressions.expression import in_order
 from ..graph.graph import CONDITIONS, Value
-from ..plain_c.values import RELATION, Conditions
-from .guards import Path, costs_inside, guarded, paths, stripped
-from .loops import printed
-from .statements import Block, Constant, Item, Operand, Place, Statement, store
+from ..plain_c.values import Conditions
+from .guards import Path, choices_in_blocks, paths, with_guards
+from .statements import Block, Constant, Item, Operand, store
 
-MOST_CHOSEN = 2  # cost of both branches of ?:
+
+class Writer(Protocol):
+    """What writes an operation: Code."""
+
+    statements: list[Item]
+    known: dict[Value, Operand]
+    names: Mapping[Value, str]
+
+    def operand(self, value: Value, given: Sequence[Operand], name: str = "") -> Operand: ...
 
 
 class Scope:
@@ -21,7 +30,11 @@ class Scope:
         self.path, self.wanted, self.outer = path, wanted, outer
         self.known: dict[Value, Operand] = {}
         self.shared: set[Value] = set()  # which a later block with this condition reads, too
+        self.results: dict[Value, Constant] = {}  # choices, and variables outside that get them
         self.items: list[Item] = []
+
+    def __contains__(self, value: Value) -> bool:
+        return self.find(value) is not None
 
     def find(self, value: Value) -> Operand | None:
         scope: Scope | None = self
@@ -31,100 +44,97 @@ class Scope:
             scope = scope.outer
         return None
 
+    def around(self, path: Path) -> Scope:
+        """Return the scope for a value with this path; this one may have begun too late for it."""
+        scope = self
+        while len(scope.path) > len(path) and scope.outer is not None:
+            scope = scope.outer
+        return scope
+
 
 class Blocks:
-    """Statements that give lvalues of C (`targets`) values; `enumerators` name whole numbers."""
+    """Operands of values and statements that calculate them."""
 
-    def __init__(
-        self,
-        targets: Mapping[str, Value],
-        names: Mapping[Value, str],
-        conditions: Conditions,
-        enumerators: Mapping[str, Mapping[int, str]],
-        taken: Iterable[str] = (),
-    ) -> None:
-        self.enumerators, self.taken = enumerators, taken
-        targets, plain = stripped(targets, conditions)
-        targets, became = guarded(targets, conditions)
+    def __init__(self, writer: Writer, conditions: Conditions, roots: Sequence[Value]) -> None:
+        self.writer = writer
+        self.successors = with_guards(roots, conditions)
         self.names: dict[Value, str] = {}
-        for value, name in names.items():
-            if plain.get(value) in became:
-                self.names.setdefault(became[plain[value]], name)
-        self.targets = targets
-        self.order = in_order(targets.values())
-        self.leaves = {
-            value: Place(
-                value.name, name="" if value.op == "integer" else self.names.get(value, "")
-            )
-            for value in self.order
-        }
-        self.paths = paths(targets)
-        inside = costs_inside(self.order, self.paths)
-        self.blocks = {  # choices with calculations in a branch; the others are `?:`
-            value: None for value in self.order
-            if value.op == "if" and inside[self.paths[value], value.arguments[0]] > MOST_CHOSEN
-        }  # fmt: skip
+        for value, name in writer.names.items():
+            if value in self.successors:
+                self.names.setdefault(self.successors[value], name)
+        self.roots = [self.successors[root] for root in roots]
+        order = in_order(self.roots)
+        self.paths = paths(self.roots)
+        self.blocks = choices_in_blocks(order, self.paths)
+        self.alike: dict[tuple[Value, Path], list[Value]] = defaultdict(list)
+        for value in self.blocks:
+            self.alike[value.arguments[0], self.paths[value]].append(value)
         self.bits = {value: 1 << i for i, value in enumerate(self.blocks)}
+        self.users = Counter(x for value in (*order, *self.roots) for x in value.arguments)
         self.depends: dict[Value, int] = {}  # on values of blocks, as bits
-        for value in self.order:
+        for value in order if self.blocks else ():
             mask = 0
             for argument in value.arguments:
                 mask |= self.depends[argument] | self.bits.get(argument, 0)
             self.depends[value] = mask
         self.in_progress = 0
+        self.done: set[Value] = set()  # choices that have been written
+        self.partly: set[Value] = set()  # with a variable that has its value in one branch
 
-    def lines(self) -> list[str]:
-        """Return the statements."""
-        scope = Scope((), set(self.order))
-        for target, value in self.targets.items():
-            scope.items.append(store(Place(target, name=target), self.of(value, scope)))
-        return printed(scope.items, taken=self.taken, is_long=False)[0]
+    def written(self) -> tuple[list[Operand], list[Item]]:
+        """Return operands of the roots, and statements; the writer knows what is always valid."""
+        scope = Scope((), set(in_order(self.roots)))
+        for value, operand in self.writer.known.items():
+            scope.known[self.successors.get(value, value)] = operand
+        found = [self._of(root, scope) for root in self.roots]
+        for value, now in self.successors.items():
+            if now in scope.known and now not in self.partly:
+                self.writer.known[value] = scope.known[now]
+        return found, scope.items
 
-    def of(self, value: Value, scope: Scope) -> Operand:
+    def _of(self, value: Value, scope: Scope) -> Operand:
         """Return the operand of a value in a block, after statements that it needs."""
-        found = scope.find(value)
-        if found is not None:
-            return found
-        if not value.arguments:
-            return value.number if value.op == "number" else self.leaves[value]
-        while len(scope.path) > len(self.paths[value]) and scope.outer is not None:
-            scope = scope.outer  # it was forgotten before the block began
+        if value not in scope:
+            scope = scope.around(self.paths[value])
+            for needed in in_order([value], scope, self._read):
+                self._calculate(needed, scope.around(self.paths[needed]))
+        return scope.find(value)
+
+    def _read(self, value: Value) -> Sequence[Value]:
+        """Return what is calculated before a value, in its block."""
+        if value in self.blocks:
+            return [value.arguments[0], *self._needed([value], self.paths[value])]
+        return value.arguments
+
+    def _calculate(self, value: Value, scope: Scope) -> None:
+        if value in scope:  # with others
+            return
         if value in self.blocks:
             self._block(value, scope)
-            return self.of(value, scope)
-        operation = self._operation(value, scope)
-        if value.op in CONDITIONS:
-            return operation
+            return
+        given = [self._of(argument, scope) for argument in value.arguments]
+        self.writer.statements = scope.items
+        operand = self.writer.operand(value, given, self.names.get(value, ""))
         if value in scope.shared and scope.outer is not None:
-            variable = self._variable(value, scope.outer, 0.0)
-            scope.items.append(store(variable, operation))
-            return variable
-        scope.known[value] = Constant(operation, name=self._name(value))
-        scope.items.append(scope.known[value])
-        return scope.known[value]
-
-    def _operation(self, value: Value, scope: Scope) -> Operand:
-        given = [self.of(argument, scope) for argument in value.arguments]
-        leaf = value.arguments[0]
-        if leaf.op == "integer" and value.op in RELATION:  # with a whole number
-            number = int(value.arguments[1].number)
-            return value.op, given[0], str(self.enumerators.get(leaf.name, {}).get(number, number))
-        for i, argument in enumerate(value.arguments):
-            if argument.op == "integer":
-                given[i] = Place(f"(double){argument.name}")
-        return value.op, *given
+            variable = self._variable(value)
+            self._declare(value, variable, scope.outer, 0.0)
+            scope.items.append(store(variable, operand))
+            self.partly.add(value)
+        else:
+            scope.known[value] = operand
 
     def _name(self, value: Value) -> str:
         """Return the name of a value or, of a choice, of what it chooses."""
         values = [value, *(value.arguments[1:] if value.op == "if" else ())]
         return next((self.names[v] for v in values if v in self.names), "")
 
-    def _variable(self, value: Value, scope: Scope, start: float | None) -> Constant:
-        """Declare a value in front of the block that calculates it."""
-        variable = scope.known[value] = Constant(None, name=self._name(value), is_kept=True)
-        first = (";",) if start is None else (" = ", start, ";")
-        scope.items.append(Statement(("double ", variable, *first)))
-        return variable
+    def _variable(self, value: Value) -> Constant:
+        return Constant(None, name=self._name(value), is_kept=True, is_variable=True)
+
+    def _declare(self, value: Value, variable: Constant, scope: Scope, start: Operand) -> None:
+        """Declare the variable of a value in front of the block that calculates it."""
+        variable.of, scope.known[value] = start, variable
+        scope.items.append(variable)
 
     # ---- Blocks ----------------------------------------------------------------------------------
 
@@ -133,14 +143,11 @@ class Blocks:
         condition, path = value.arguments[0], self.paths[value]
         group = [value]
         busy, below = self.in_progress | self.bits[value], self.depends[value]
-        same = [
-            other for other in self.blocks
-            if other.arguments[0] is condition and self.paths[other] == path
-            and other in scope.wanted and scope.find(other) is None
-        ]  # fmt: skip
+        same = [v for v in self.alike[condition, path] if v not in self.done]
         for other in same:
             if (
                 other is not value
+                and other in scope.wanted
                 and not self.depends[other] & busy
                 and not (self.in_progress | below) & self.bits[other]
             ):
@@ -149,30 +156,39 @@ class Blocks:
                 below |= self.depends[other]
         before, self.in_progress = self.in_progress, busy
         for needed in self._needed(group, path):
-            self.of(needed, scope)
-        head = self.of(condition, scope)
+            self._of(needed, scope)
+        head = self._of(condition, scope)
+        later = [v for v in same if v not in group and v not in self.done]
+        variables = [scope.results.get(v) or self._variable(v) for v in group]
         bodies = []
         for holds in (True, False):
             results = [member.arguments[1 if holds else 2] for member in group]
             inner = Scope((*path, (condition, holds)), set(), scope)
             inner.wanted = self._inside(results, len(inner.path))
-            later = [other for other in same if scope.find(other) is None and other not in group]
             inner.shared = self._shared(later, inner, 1 if holds else 2)
-            bodies.append((inner.items, [self.of(result, inner) for result in results]))
+            for result, variable in zip(results, variables, strict=True):
+                is_own = self.users[result] == 1 and self.paths[result] == inner.path
+                if is_own and result in self.bits and result not in inner.shared:
+                    inner.results[result] = variable
+            given = [self._of(result, inner) for result in results]
+            bodies.append((inner.items, given))
         if _are_numbers(*bodies[0]):
             head, bodies = ("not", head), bodies[::-1]
         self.in_progress = before
         has_starts = _are_numbers(*bodies[1])
-        variables = []
-        for member, start in zip(group, bodies[1][1], strict=True):
-            is_shared = member in scope.shared and scope.outer is not None
-            to = scope.outer if is_shared else scope
-            first = 0.0 if is_shared else start if has_starts else None
-            variables.append(self._variable(member, to, first))
-            if is_shared and has_starts:
-                scope.items.append(store(variables[-1], start))
+        for member, variable, start in zip(group, variables, bodies[1][1], strict=True):
+            if member in scope.results:
+                scope.known[member] = variable
+                scope.items += [store(variable, start)] * has_starts
+            elif member in scope.shared and scope.outer is not None:
+                self._declare(member, variable, scope.outer, 0.0)
+                self.partly.add(member)
+                scope.items += [store(variable, start)] * has_starts
+            else:
+                self._declare(member, variable, scope, start if has_starts else None)
+        self.done.update(group)
         full = [
-            [*items, *(store(to, of) for to, of in zip(variables, given, strict=True))]
+            [*items, *(store(to, x) for to, x in zip(variables, given, strict=True) if to is not x)]
             for items, given in bodies[: 1 if has_starts else 2]
         ]
         scope.items.append(Block(head, tuple(full)))

@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from ..expressions.expression import in_order
 from ..graph.graph import CONDITIONS, LEAVES, Value
+from ..plain_c.values import RELATION, Conditions
+from .blocks import Blocks
 from .loops import printed
-from .statements import Constant, Item, Operand, Place, store
+from .statements import Block, Constant, Item, Operand, Place, store
 
 WITHOUT_DERIVATIVES = ("value_of", "moving_as")  # elsewhere they are their first argument
 FUNCTIONS = {"hypot": "slopes_hypot", "noise": "random_normal", "uniform": "random_uniform"}
 
 
 class Leaves(dict[tuple[str, str], Operand]):
-    """Where C has leaves, by operation and name; names of values, and arrays of tables in use."""
+    """Where C has leaves, by operation and name.
+
+    names: of values. arrays: of tables in use. conditions: what integer leaves may be.
+    """
 
     def __init__(
         self,
         places: Mapping[tuple[str, str], Operand],
         names: Mapping[Value, str],
         arrays: set[str],
+        conditions: Conditions,
     ) -> None:
         super().__init__(places)
-        self.names, self.arrays = names, arrays
+        self.names, self.arrays, self.conditions = names, arrays, conditions
 
     def but(self, own: Mapping[tuple[str, str], Operand]) -> Leaves:
         """Return these leaves, of which some are elsewhere."""
-        return Leaves({**self, **own}, self.names, self.arrays)
+        return Leaves({**self, **own}, self.names, self.arrays, self.conditions)
 
 
 class Code:
@@ -52,21 +58,24 @@ class Code:
         if self.outer and not root.moves:
             return self.outer.of(root)
         for value in () if root in self.known else in_order([root], self.known):
-            self.known[value] = self._operand(value)
+            self.known[value] = self.operand(value, [self.known[x] for x in value.arguments])
         return self.known[root]
 
-    def _operand(self, value: Value) -> Operand:
+    def operand(self, value: Value, given: Sequence[Operand], name: str = "") -> Operand:
+        """Return the operand of an operation on others, after its statement."""
         if value.op == "number":
             return value.number
         if value.op in LEAVES:
-            return self.leaves[value.op, value.name]
+            place = self.leaves[value.op, value.name]
+            return ("double", place) if self._is_int(value) else place
         if self.outer and not value.moves:
             return self.outer.of(value)
-        given = [self.known[argument] for argument in value.arguments]
-        name = self.names.get(value, "")
+        name = self.names.get(value, name)
         match value.op:
             case op if op in WITHOUT_DERIVATIVES:
                 return given[0]
+            case op if op in RELATION and self._is_int(value.arguments[0]):
+                return self._comparison(value, given)
             case "entry":
                 self.leaves.arrays.add(value.name)
                 return self.constant(("entry", value.name, *given), name=name)
@@ -80,6 +89,22 @@ class Code:
         c_type = "int" if value.op in CONDITIONS else "double"
         return self.constant(called(value.op, *given), c_type, name)
 
+    def _is_int(self, value: Value) -> bool:
+        """Return whether C has an integer leaf as an int."""
+        place = self.leaves.get((value.op, value.name))
+        return value.op == "integer" and isinstance(place, Place) and place.c_type == "int"
+
+    def _comparison(self, value: Value, given: Sequence[Operand]) -> Operand:
+        """Compare an integer leaf, as an int with a whole number."""
+        leaf, other = value.arguments
+        if other.op != "number" or other.number != int(other.number):
+            return self.constant((value.op, *given), "int")
+        return value.op, self.leaves[leaf.op, leaf.name], self.whole(leaf, int(other.number))
+
+    def whole(self, _leaf: Value, number: int) -> str:
+        """Return a number that a leaf is compared with."""
+        return str(number)
+
     def constant(
         self, of: Operand, c_type: str = "double", name: str = "", is_kept: bool = False
     ) -> Constant:
@@ -89,9 +114,15 @@ class Code:
 
     def assign(self, values: Mapping[Place, Value]) -> Code:
         """Give places their values, after all of them have been calculated."""
-        found = [(target, self.of(value)) for target, value in values.items()]
-        self.statements += [store(target, of) for target, of in found]
+        before = self.statements
+        given, statements = Blocks(self, self.leaves.conditions, [*values.values()]).written()
+        self.statements = [*before, *statements, *map(store, values, given)]
         return self
+
+    @property
+    def has_blocks(self) -> bool:
+        """Whether later statements may not read all that is calculated."""
+        return any(isinstance(item, Block) for item in self.statements)
 
     def lines(self) -> list[str]:
         """Return the text of the statements."""

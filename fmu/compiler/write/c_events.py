@@ -15,6 +15,7 @@ from ..expressions.expression import in_order
 from ..expressions.kinds import CONDITION, WHOLE, Kind
 from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
+from ..plain_c.values import Conditions
 from ..read.content import COUNTS, SWITCHES, Change, ModelFile, Sampler
 from .c_code import Code, Leaves, located
 from .c_text import declared, filled, indented, shortened, text
@@ -36,6 +37,7 @@ NEXT_TIME = [
 def leaves(file: ModelFile) -> Leaves:
     """Where functions of value structures have the leaves, and their derivatives along a curve."""
     rounding = ("*", "RELATIONS_TIME_ROUNDING", ("fabs", "time"))
+    conditions = Conditions(file.graph)
     found: dict[tuple[str, str], Operand] = {("time", ""): "time", ("first", ""): "dt"}
     found["later", ""] = "relations_later", "time", rounding
     for v in file.of("parameters", "inputs", "states", "discrete"):
@@ -45,16 +47,17 @@ def leaves(file: ModelFile) -> Leaves:
         found["second", v.name] = field_of("second", field, f"dd_{v.name}")
     for name, kind in file.kinds.items():
         field = file.fields.count(name)
-        found |= (
-            {("mode", name): field_of("values", field, name, "int")}
-            if kind == CONDITION
-            else {("integer", name): field_of("(double)values", field, name)}
-        )
+        leaf = file.graph.value("mode" if kind == CONDITION else "integer", name=name)
+        if isinstance(kind, tuple):
+            conditions.domains[leaf] = frozenset(range(1, 1 + len(kind)))
+        is_int = kind == CONDITION or leaf in conditions.domains
+        given = ("values", field, name, "int") if is_int else ("(double)values", field, name)
+        found[leaf.op, name] = field_of(*given)
     for i, name in enumerate(file.graph.segments):
         found["integer", name] = Place("values->segments[", i, "]")
     for i, name in enumerate(file.graph.relations):
         found["mode", name] = Place("values->relations[", i, "]")
-    return Leaves(found, file.graph.names, file.graph.arrays)
+    return Leaves(found, file.graph.names, file.graph.arrays, conditions)
 
 
 def arrays(file: ModelFile) -> Leaves:

@@ -306,19 +306,20 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
     for prefix, found in (("dd", curve.seconds), ("d", curve.firsts)):
         of = [(found[value], name) for value, name in graph.names.items() if value in found]
         names |= {value: f"{prefix}_{name}" for value, name in of}
-    code, sections = Code(leaves(file), names=names), []
-    for structure, order in (("first", firsts), ("second", seconds)):
-        targets = [field_of(structure, field, field) for field in fields]
-        code.assign(dict(zip(targets, order, strict=True)))
-        sections.append(code.statements)
-        code.statements = []
+    targets = {
+        structure: {
+            field_of(structure, field, field): value
+            for field, value in zip(fields, order, strict=True)
+        }
+        for structure, order in (("first", firsts), ("second", seconds))
+    }
     outputs = Code(leaves(file))
     outputs.assign({field_of("to", field, field): value for field, value in fields.items()})
     for v in file.calculated_counts:
         field = file.fields.count(v.name)
         of = count(outputs, v.kind, v.value)
         outputs.statements.append(store(field_of("to", field, field), of))
-    first, second = printed(*sections)
+    first, second = _of_both(Code(leaves(file), names=names), **targets)
     is_long = len(first) + len(second) >= LONG
     return {
         "storage_of_derivatives": "SELDOM_CALLED static" if is_long else "static",
@@ -328,6 +329,21 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
         "derivatives": first,
         "second_derivatives": second,
     }
+
+
+def _of_both(
+    code: Code, first: Mapping[Place, Value], second: Mapping[Place, Value]
+) -> list[list[str]]:
+    """Return statements for first derivatives, and those behind them for the second ones."""
+    end = ["if (second == NULL) {", "    return STATUS_OK;", "}"]
+    firsts = code.assign(first).statements
+    if code.has_blocks:
+        alone = ["if (second == NULL) {", *indented([*code.lines(), "return STATUS_OK;"]), "}"]
+        both = Code(code.leaves, names=code.names).assign({**first, **second})
+        return [alone, both.lines()]
+    code.statements = []
+    lines = printed(firsts, code.assign(second).statements)
+    return [[*lines[0], *end], lines[1]]
 
 
 def _at_start(file: ModelFile, structure: str, derivatives: Mapping[Field, Value]) -> list[str]:

@@ -8,17 +8,33 @@ from typing import Any
 
 from pycparser import c_ast
 
+from ..expressions.expression import in_order
 from ..graph.curve import Curve
 from ..graph.graph import Graph, Value
 from ..plain_c.interpreter import Interpreter
 from ..plain_c.memory import Array, Pointer, Structure, is_real, is_whole
 from ..plain_c.text import CTextError, Program, refused
-from .blocks import Blocks
+from . import statements
+from .c_code import Code, Leaves
 from .c_text import WIDTH, indented
+from .loops import printed
+from .statements import Operand
 
 Place = tuple[str | int, ...]  # a part of an argument, from its name
 KINDS = ("jacobian", "rates", "derivatives")
 FORM = "NAME = jacobian|rates|derivatives of FUNCTION [OUTPUT ...] by ARGUMENT ..."
+
+
+class WithEnumerators(Code):
+    """Statements where whole numbers have their names."""
+
+    def __init__(self, leaves: Leaves, names: Mapping[str, Mapping[int, str]]) -> None:
+        super().__init__(leaves)
+        self.enumerators = names
+
+    def whole(self, leaf: Value, number: int) -> str:
+        """Return the name of a number that a leaf is compared with."""
+        return self.enumerators.get(leaf.name, {}).get(number, str(number))
 
 
 @dataclass(frozen=True)
@@ -291,7 +307,17 @@ class Function:
     def _lines(self, targets: Mapping[str, Value], names: Mapping[Value, str]) -> list[str]:
         taken = {*self.kinds, "first", "second", "J"}
         taken |= {f"{name}_{order}" for name in self.kinds for order in ("first", "second")}
-        return Blocks(targets, names, self.interpreter.conditions, self.enumerators, taken).lines()
+        places: dict[tuple[str, str], Operand] = {}
+        for leaf in in_order(targets.values()):
+            is_int = leaf.op == "integer"
+            name, c_type = ("", "int") if is_int else (names.get(leaf, ""), "double")
+            places[leaf.op, leaf.name] = statements.Place(leaf.name, name=name, c_type=c_type)
+        leaves = Leaves(places, names, set(), self.interpreter.conditions)
+        written = WithEnumerators(leaves, self.enumerators)
+        written.assign(
+            {statements.Place(target, name=target): value for target, value in targets.items()}
+        )
+        return printed(written.statements, taken=taken, is_long=False)[0]
 
     def _definition(
         self, name: str, parameters: list[str], lines: list[str], storage: str = ""

@@ -8,15 +8,17 @@ efforts, energies and loads read it under conditions of their own.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..expressions.expression import in_order
-from ..graph.graph import CONDITIONS, Value
+from ..graph.graph import CONDITIONS, Value, is_unknown
 from ..plain_c.values import Conditions, Known
 
 COSTS = {"+": 1, "-": 1, "*": 1, "negative": 0, "/": 5, "value_of": 0, "moving_as": 0, "if": 0}
+COSTS |= {"entry": 1, "element": 2}
 OF_FUNCTION = 20
+MOST_CHOSEN = 4  # cost of both branches of ?:
 WORTH_A_BRANCH = 8  # cost of what is not calculated then
 MOST_LEVELS = 20  # of guards within each other
 Path = tuple[tuple[Value, bool], ...]  # conditions that hold, or do not, from outside to inside
@@ -37,17 +39,35 @@ def cost(value: Value) -> int:
     return COSTS.get(value.op, OF_FUNCTION)
 
 
-def stripped(targets: Mapping[str, Value], conditions: Conditions) -> tuple[
-    dict[str, Value], dict[Value, Value]
-]:  # fmt: skip
+def with_guards(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value]:
+    """Put values that only some cases need behind choices; map each to its successor."""
+    order = in_order(roots)
+    if not any(value.op == "if" for value in order):
+        return {value: value for value in order}
+    plain = stripped(roots, conditions)
+    conditions.learn(plain.values())
+    found = guarded([plain[root] for root in roots], conditions)
+    return {value: found[now] for value, now in plain.items() if now in found}
+
+
+def choices_in_blocks(order: Iterable[Value], places: Mapping[Value, Path]) -> list[Value]:
+    """Return choices with calculations in a branch; the others are `?:`."""
+    inside = costs_inside(order, places)
+    return [
+        value for value in order
+        if value.op == "if" and inside[places[value], value.arguments[0]] > MOST_CHOSEN
+    ]  # fmt: skip
+
+
+def stripped(roots: Iterable[Value], conditions: Conditions) -> dict[Value, Value]:
     """Remove operations that differ in derivatives only; map each value to its successor."""
     found: dict[Value, Value] = {}
-    for value in in_order(targets.values()):
+    for value in in_order(roots):
         if value.op in ("value_of", "moving_as"):
             found[value] = found[value.arguments[0]]
         else:
             found[value] = _with(value, [found[a] for a in value.arguments], conditions)
-    return {target: found[value] for target, value in targets.items()}, found
+    return found
 
 
 def _with(value: Value, arguments: list[Value], conditions: Conditions) -> Value:
@@ -61,14 +81,14 @@ def _with(value: Value, arguments: list[Value], conditions: Conditions) -> Value
     return new
 
 
-def paths(targets: Mapping[str, Value]) -> dict[Value, Path]:
+def paths(roots: Iterable[Value]) -> dict[Value, Path]:
     """Find the innermost branch that contains all uses of a value."""
-    found: dict[Value, Path] = {value: () for value in targets.values()}
+    found: dict[Value, Path] = dict.fromkeys(roots, ())
 
     def use(value: Value, path: Path) -> None:
         found[value] = common(found[value], path) if value in found else path
 
-    for value in in_order(targets.values())[::-1]:
+    for value in in_order([*found])[::-1]:
         path = found[value]
         for argument, literal in _uses(value):
             use(argument, (*path, literal) if literal else path)
@@ -77,7 +97,7 @@ def paths(targets: Mapping[str, Value]) -> dict[Value, Path]:
 
 def _uses(value: Value) -> list[tuple[Value, tuple[Value, bool] | None]]:
     """Yield arguments, with the condition under which they are used."""
-    if value.op != "if":
+    if value.op != "if" or is_unknown(value):
         return [(argument, None) for argument in value.arguments]
     condition, first, second = value.arguments
     return [(condition, None), (first, (condition, True)), (second, (condition, False))]
@@ -113,28 +133,24 @@ def costs_inside(
     return found
 
 
-def guarded(
-    targets: Mapping[str, Value], conditions: Conditions
-) -> tuple[dict[str, Value], dict[Value, Value]]:
+def guarded(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value]:
     """Put values that only some cases need behind choices; map each to its successor."""
-    became = {value: value for value in in_order(targets.values())}
+    became = {value: value for value in in_order(roots)}
     for _ in range(MOST_LEVELS):
-        guards = Guards(targets, conditions)
+        guards = Guards([became[root] for root in roots], conditions)
         if not guards.found:
             break
-        targets, found = guards.rewritten()
+        found = guards.rewritten()
         became = {value: found[now] for value, now in became.items() if now in found}
-    targets, found = settled(targets, conditions)
-    return targets, {value: found[now] for value, now in became.items() if now in found}
+    found = settled([became[root] for root in roots], conditions)
+    return {value: found[now] for value, now in became.items() if now in found}
 
 
-def settled(
-    targets: Mapping[str, Value], conditions: Conditions
-) -> tuple[dict[str, Value], dict[Value, Value]]:
+def settled(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value]:
     """Remove choices that the blocks around them have made; map each value to its successor."""
-    places = paths(targets)
+    places = paths(roots)
     found: dict[Value, Value] = {}
-    for value in in_order(targets.values()):
+    for value in in_order(roots):
         now = _with(value, [found[a] for a in value.arguments], conditions)
         if value.op == "if" and places[value]:
             known = known_on(places[value], conditions)
@@ -142,17 +158,17 @@ def settled(
             if choice.op == "number":
                 now = now.arguments[1 if choice.number else 2]
         found[value] = now
-    return {target: found[value] for target, value in targets.items()}, found
+    return found
 
 
 class Guards:
     """The guards of values that are needed in some cases only: conditions that stand outermost."""
 
-    def __init__(self, targets: Mapping[str, Value], conditions: Conditions) -> None:
-        self.targets, self.conditions = targets, conditions
-        self.order = in_order(targets.values())
-        self.paths = paths(targets)
-        self.needs: dict[Value, Need] = {value: Need() for value in targets.values()}
+    def __init__(self, roots: Sequence[Value], conditions: Conditions) -> None:
+        self.conditions = conditions
+        self.order = in_order(roots)
+        self.paths = paths(roots)
+        self.needs: dict[Value, Need] = dict.fromkeys(roots, Need())
         for value in self.order[::-1]:
             need = self.needs[value]
             for argument, literal in _uses(value):
@@ -161,8 +177,8 @@ class Guards:
                 self.needs[argument] = new if known is None else self._either(known, new)
         self.found = self._guards()
 
-    def rewritten(self) -> tuple[dict[str, Value], dict[Value, Value]]:
-        """Return the targets' values with guards; map each value to its successor."""
+    def rewritten(self) -> dict[Value, Value]:
+        """Put guards into the roots; map each value to its successor."""
         zero = self.conditions.graph.number(0.0)
         guards = self.found
         found: dict[Value, Value] = {}
@@ -174,7 +190,7 @@ class Guards:
                     new = self.conditions.select(guard, new, zero)
                 arguments.append(new)
             found[value] = _with(value, arguments, self.conditions)
-        return {target: found[value] for target, value in self.targets.items()}, found
+        return found
 
     def _is_inside(
         self,

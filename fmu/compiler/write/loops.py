@@ -7,19 +7,32 @@ another turn reads is kept in an array.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter, defaultdict
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from operator import attrgetter, sub
 
 from ..graph.graph import DERIVATIVES
 from .c_text import WIDTH, number, wrapped
-from .statements import Constant, Item, Operand, Place, Statement, folded, places_in, write
+from .statements import (
+    Block,
+    Constant,
+    Item,
+    Operand,
+    Place,
+    Statement,
+    all_items,
+    folded,
+    places_in,
+    write,
+)
 
 SHORTEST = 400  # statements of a function that gains by loops
 FEWEST_TURNS = 4
+MOST_LEFT = 0.7  # of the lines of a function with branches that gains by loops
 MOST_TRIED = 40  # lengths of a turn
 RARE, FEWEST_LITERALS = 16, 20  # occurrences of a number, and such numbers, for a table of them
 TABLE = "numbers"
@@ -91,9 +104,11 @@ def printed(
     has_named_places: of a short function, those that are read more than once.
     """
     if is_long is None:
-        is_long = sum(map(len, sections)) >= SHORTEST
-    names, parts = Names(taken), folded(sections, is_long)
-    lines = _with_loops(parts, names) if is_long else _short(parts, names, has_named_places)
+        is_long = sum(1 for _ in all_items(chain(*sections))) >= SHORTEST
+    parts = folded(sections, is_long)
+    lines = _with_loops(parts, Names(taken)) if is_long else None
+    if lines is None:
+        lines = _short(parts, Names(taken), has_named_places)
     room = WIDTH - INDENT
     return [
         [part for text in texts for line in text.split("\n") for part in wrapped(line, room)]
@@ -102,30 +117,35 @@ def printed(
 
 
 def pieces(item: Item, named: Mapping[Place, Constant]) -> list[Operand]:
-    """Return an item as texts, numbers, indexes and constants; `named` stand for places."""
+    """Return an item as texts, numbers, indexes and constants; `named` stand for places.
+
+    Of a block, that is its first line.
+    """
     found: list[Operand] = []
     if isinstance(item, Constant):
-        found += [f"const {item.c_type} ", item, " = "]
-        write(item.of, found, named)
+        found += [item.declaration, item]
+        if item.of is not None:
+            found.append(" = ")
+            write(item.of, found, named)
         found.append(";")
     elif isinstance(item, Statement):
         for part in item.parts:
             write(part, found, named)
     else:
-        for i, body in enumerate(item.bodies):
-            found.append("} else {" if i else "if (")
-            if i == 0:
-                write(item.condition, found, named)
-                found.append(") {")
-            for inner in body:
-                found.append("\n    ")
-                found += [
-                    piece.replace("\n", "\n    ") if isinstance(piece, str) else piece
-                    for piece in pieces(inner, named)
-                ]
-            found.append("\n")
-        found.append("}")
+        found.append("if (")
+        write(item.condition, found, named)
+        found.append(") {")
     return found
+
+
+def _block(head: str, bodies: Iterable[Iterable[str]]) -> Iterator[str]:
+    """Yield the lines of a block, from those of its bodies."""
+    yield head
+    for i, body in enumerate(bodies):
+        if i:
+            yield "} else {"
+        yield from ("    " + text.replace("\n", "\n    ") for text in body)
+    yield "}"
 
 
 def _short(sections: list[list[Item]], names: Names, has_named_places: bool) -> list[list[str]]:
@@ -140,18 +160,28 @@ def _short(sections: list[list[Item]], names: Names, has_named_places: bool) -> 
             if place.name and place not in known and (count > 1 or place.is_opaque)
             if has_named_places
         }
-        named, items, left = known | new, [], dict(new)
+        named, texts, left = known | new, [], dict(new)
         for item in section:
             if left:
                 read = [place for place in places_in(item) if place in left]
-                items += [pieces(left.pop(place), {}) for place in dict.fromkeys(read)]
-            items.append(pieces(item, named))
-        found.append(["".join(_shown(piece, names) for piece in item) for item in items])
+                texts += [_shown(left.pop(place), {}, names) for place in dict.fromkeys(read)]
+            texts.append(_shown(item, named, names))
+        found.append(texts)
         known = known if i else new
     return found
 
 
-def _shown(piece: Operand, names: Names) -> str:
+def _shown(item: Item, named: Mapping[Place, Constant], names: Names) -> str:
+    """Return the text of an item."""
+    head = "".join(_piece(piece, names) for piece in pieces(item, named))
+    if not isinstance(item, Block):
+        return head
+    return "\n".join(
+        _block(head, [[_shown(inner, named, names) for inner in body] for body in item.bodies])
+    )
+
+
+def _piece(piece: Operand, names: Names) -> str:
     match piece:
         case Constant():
             return names.of(piece)
@@ -161,16 +191,23 @@ def _shown(piece: Operand, names: Names) -> str:
 
 
 class Line:
-    """A statement, taken apart at its numbers and constants once."""
+    """A statement, taken apart at its numbers and constants once; the first may be `defined`."""
 
-    def __init__(self, texts: list[str], slots: list[Constant | None], numbers: list[int]) -> None:
+    def __init__(
+        self,
+        texts: list[str],
+        slots: list[Constant | None],
+        numbers: list[int],
+        defined: Constant | None = None,
+    ) -> None:
         self.texts, self.slots, self.numbers = texts, slots, tuple(numbers)
+        self.defined = defined
         bases = [slot.base if slot else "" for slot in slots]
         self.form = "\0".join(chain.from_iterable(zip(texts, [*bases, ""], strict=True)))
 
     @classmethod
-    def of(cls, found: list[Operand], places: Mapping[Constant, int]) -> Line:
-        """Take pieces apart; `places` are the constants' numbers."""
+    def of(cls, item: Item, found: list[Operand], places: Mapping[Constant, int]) -> Line:
+        """Take the pieces of an item apart; `places` are the constants' numbers."""
         texts, slots, numbers = [""], [], []
         for piece in found:
             if isinstance(piece, str):
@@ -182,14 +219,20 @@ class Line:
                 slots.append(piece if is_constant else None)
                 numbers.append(places[piece] if is_constant else piece)
                 texts.append("")
-        return cls(texts, slots, numbers)
+        return cls(texts, slots, numbers, item if isinstance(item, Constant) else None)
 
-    def with_arrays(self, kept: Mapping[Constant, tuple[str, int]], defined: bool) -> Line:
+    def lines(self) -> Iterator[Line]:
+        """Yield this line."""
+        yield self
+
+    def with_arrays(self, kept: Mapping[Constant, tuple[str, int]]) -> Line | None:
         """Return the line, where elements of arrays replace constants."""
         if kept.keys().isdisjoint(self.slots):
             return self
         texts, slots, numbers = [*self.texts], [*self.slots], [*self.numbers]
-        if defined and slots[0] in kept:
+        if self.defined in kept:
+            if self.defined.of is None:
+                return None
             texts[0] = ""
         for i, slot in enumerate(slots):
             if slot in kept:
@@ -197,7 +240,7 @@ class Line:
                 texts[i] += f"{array}["
                 texts[i + 1] = f"]{texts[i + 1]}"
                 slots[i] = None
-        return Line(texts, slots, numbers)
+        return Line(texts, slots, numbers, self.defined)
 
     def text(self, terms: Sequence[str], depth: int, names: Names) -> Iterator[str]:
         """Yield the lines of C; terms: added to the numbers."""
@@ -210,31 +253,80 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Loop:
-    """Turns of lines, with the numbers of the first turn."""
+class Branches:
+    """A line with a condition, and the bodies of its block."""
 
-    lines: tuple[Line | Loop, ...]
+    head: Line
+    bodies: tuple[list[Part], ...]
+    form: tuple = field(init=False)
+    numbers: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        shape = tuple(tuple(part.form for part in body) for body in self.bodies)
+        object.__setattr__(self, "form", (self.head.form, shape))
+        object.__setattr__(self, "numbers", (*chain(*map(NUMBERS, self.parts)),))
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The head and all of the bodies."""
+        return self.head, *chain(*self.bodies)
+
+    def lines(self) -> Iterator[Line]:
+        """Yield all lines."""
+        for part in self.parts:
+            yield from part.lines()
+
+    def with_arrays(self, kept: Mapping[Constant, tuple[str, int]]) -> Branches:
+        """Return the block, where elements of arrays replace constants, with loops."""
+        return Branches(
+            self.head.with_arrays(kept), tuple([_rolled(body, kept) for body in self.bodies])
+        )
+
+    def text(self, terms: Sequence[str], depth: int, names: Names) -> Iterator[str]:
+        """Yield the lines of C; terms: added to the numbers."""
+        left = iter(terms)
+
+        def of(part: Part) -> Iterator[str]:
+            return part.text([*islice(left, len(part.numbers))], depth, names)
+
+        (head,) = of(self.head)
+        return _block(head, (chain.from_iterable(map(of, body)) for body in self.bodies))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Turns of parts, with the numbers of the first turn."""
+
+    parts: tuple[Part, ...]
     turns: int
     steps: tuple[int, ...]  # of the numbers, from turn to turn
     form: tuple = field(init=False)
     numbers: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        shape = (tuple(line.form for line in self.lines), self.turns, self.steps)
+        shape = (tuple(part.form for part in self.parts), self.turns, self.steps)
         object.__setattr__(self, "form", shape)
-        object.__setattr__(self, "numbers", (*chain(*map(NUMBERS, self.lines)),))
+        object.__setattr__(self, "numbers", (*chain(*map(NUMBERS, self.parts)),))
+
+    def lines(self) -> Iterator[Line]:
+        """Yield the lines of a turn."""
+        for part in self.parts:
+            yield from part.lines()
 
     def text(self, terms: Sequence[str], depth: int, names: Names) -> Iterator[str]:
         """Yield the lines of C."""
         turn, used = f"r{depth}", 0
         yield f"for (size_t {turn} = 0; {turn} < {self.turns}; {turn}++) {{"
         own = [f"{term}{_moved(step, turn)}" for term, step in zip(terms, self.steps, strict=True)]
-        for line in self.lines:
-            count = len(line.numbers)
-            for text in line.text(own[used : used + count], depth + 1, names):
+        for part in self.parts:
+            count = len(part.numbers)
+            for text in part.text(own[used : used + count], depth + 1, names):
                 yield "    " + text.replace("\n", "\n    ")
             used += count
         yield "}"
+
+
+Part = Line | Branches | Loop
 
 
 def _moved(step: int, turn: str) -> str:
@@ -243,27 +335,30 @@ def _moved(step: int, turn: str) -> str:
     return f" {sign} {turn}" if by == 1 else f" {sign} {by} * {turn}" if by else ""
 
 
-def _with_loops(sections: list[list[Item]], names: Names) -> list[list[str]]:
-    """Return the texts of sections with loops."""
-    defined = [[isinstance(item, Constant) for item in section] for section in sections]
+def _with_loops(sections: list[list[Item]], names: Names) -> list[list[str]] | None:
+    """Return the texts of sections with loops; None if branches gain little by them."""
     counts: Counter[str] = Counter()  # of constants by base
     numbers: dict[Constant, int] = {}
-    for item in chain(*sections):
+    for item in all_items(chain(*sections)):
         if isinstance(item, Constant):
             numbers[item] = counts[item.base]
             counts[item.base] += 1
-    found = [[pieces(item, {}) for item in section] for section in sections]
-    table = _moved_to_table(found)
-    lines = [[Line.of(item, numbers) for item in section] for section in found]
+    found = {item: pieces(item, {}) for item in all_items(chain(*sections))}
+    table = _moved_to_table(found.values())
+
+    def part(item: Item) -> Part:
+        line = Line.of(item, found[item], numbers)
+        if not isinstance(item, Block):
+            return line
+        return Branches(line, tuple([[*map(part, body)] for body in item.bodies]))
+
+    lines = [[*map(part, section)] for section in sections]
     arrays: dict[tuple[str, str], str] = {}  # names by base and type
     kept: dict[Constant, tuple[str, int]] = {}  # elements of arrays
     sizes: Counter[tuple[str, str]] = Counter()
     while True:
-        rolled = [
-            _loops([line.with_arrays(kept, d) for line, d in zip(*pair, strict=True)])
-            for pair in zip(lines, defined, strict=True)
-        ]
-        new = _read_by_others(lines, defined, kept, rolled)
+        rolled = [_rolled(section, kept) for section in lines]
+        new = _read_by_others(lines, kept, rolled)
         if not new:
             break
         sizes.clear()
@@ -274,6 +369,9 @@ def _with_loops(sections: list[list[Item]], names: Names) -> list[list[str]]:
                     arrays[key] = names.free(constant.base, "")
                 kept[constant] = arrays[key], sizes[key]
                 sizes[key] += 1
+    count = sum(1 for part in chain(*rolled) for _ in part.lines())
+    if count > MOST_LEFT * len(found) and any(isinstance(item, Block) for item in found):
+        return None
     texts = [
         [text for item in items for text in item.text([""] * len(item.numbers), 0, names)]
         for items in rolled
@@ -285,14 +383,18 @@ def _with_loops(sections: list[list[Item]], names: Names) -> list[list[str]]:
     return texts
 
 
-def _moved_to_table(sections: list[list[list[Operand]]]) -> list[float]:
+def _rolled(parts: Iterable[Part], kept: Mapping[Constant, tuple[str, int]]) -> list[Part]:
+    """Return parts with arrays and loops."""
+    found = [part.with_arrays(kept) for part in parts]
+    return _loops([part for part in found if part is not None])
+
+
+def _moved_to_table(items: Collection[list[Operand]]) -> list[float]:
     """Replace rare numbers by elements of a table: they are other ones in each turn."""
-    counts = Counter(
-        number(x) for section in sections for item in section for x in item if isinstance(x, float)
-    )
+    counts = Counter(number(x) for item in items for x in item if isinstance(x, float))
     rare = {text for text, count in counts.items() if count <= RARE}
     table: list[float] = []
-    for item in chain(*sections) if len(rare) >= FEWEST_LITERALS else ():
+    for item in items if len(rare) >= FEWEST_LITERALS else ():
         parts = [*item]
         item.clear()
         for x in parts:
@@ -304,7 +406,7 @@ def _moved_to_table(sections: list[list[list[Operand]]]) -> list[float]:
     return table
 
 
-def _loops(items: list[Line | Loop]) -> list[Line | Loop]:
+def _loops(items: list[Part]) -> list[Part]:
     """Return the statements with loops, the innermost ones found first."""
     while True:
         shorter = _once(items)
@@ -313,14 +415,14 @@ def _loops(items: list[Line | Loop]) -> list[Line | Loop]:
         items = shorter
 
 
-def _once(items: list[Line | Loop]) -> list[Line | Loop]:
+def _once(items: list[Part]) -> list[Part]:
     known: dict[object, int] = {}
     forms = [known.setdefault(item.form, len(known)) for item in items]
     following, last = [len(items)] * len(items), {}
     for i in reversed(range(len(items))):
         following[i] = last.get(forms[i], len(items))
         last[forms[i]] = i
-    found: list[Line | Loop] = []
+    found: list[Part] = []
     i = 0
     while i < len(items):
         loop, length = _loop_at(items, forms, following, i)
@@ -330,7 +432,7 @@ def _once(items: list[Line | Loop]) -> list[Line | Loop]:
 
 
 def _loop_at(
-    items: list[Line | Loop], forms: list[int], following: list[int], begin: int
+    items: list[Part], forms: list[int], following: list[int], begin: int
 ) -> tuple[Loop | None, int]:
     """Return the loop with the shortest turns that begins here, and how many items it replaces."""
     other = following[begin]
@@ -353,9 +455,7 @@ def _loop_at(
     return None, 1
 
 
-def _steps(
-    items: list[Line | Loop], forms: list[int], a: int, length: int
-) -> tuple[int, ...] | None:
+def _steps(items: list[Part], forms: list[int], a: int, length: int) -> tuple[int, ...] | None:
     """Return by how much numbers change from turn to turn; None if these are not enough turns."""
     if forms[a : a + FEWEST_TURNS * length : length].count(forms[a]) < FEWEST_TURNS:
         return None
@@ -369,27 +469,28 @@ def _steps(
     return steps
 
 
-def _change(items: list[Line | Loop], a: int, count: int, distance: int) -> tuple[int, ...]:
+def _change(items: list[Part], a: int, count: int, distance: int) -> tuple[int, ...]:
     """Return by how much the numbers of `count` items change over a distance."""
     pairs = (map(NUMBERS, items[b : b + count]) for b in (a + distance, a))
     return tuple(map(sub, *map(chain.from_iterable, pairs)))
 
 
 def _read_by_others(
-    lines: list[list[Line]],
-    defined: list[list[bool]],
-    kept: Container[Constant],
-    found: list[list[Line | Loop]],
+    parts: list[list[Part]], kept: Container[Constant], found: list[list[Part]]
 ) -> set[Constant]:
     """Return the constants that are read where their names do not mean them."""
     where: dict[Constant, tuple[int, ...]] = {}  # turns in which a constant is defined
     others: set[Constant] = set()
-    count = iter(range(sum(map(len, lines)) + 1))
-    for section, flags, items in zip(lines, defined, found, strict=True):
+    count = itertools.count()
+    for section, items in zip(parts, found, strict=True):
         places = (place for item in items for place in _places(item, (), (), count))
-        for line, is_definition, (turns, steps) in zip(section, flags, places, strict=True):
+        left = (
+            line for part in section for line in part.lines()
+            if not (line.defined in kept and line.defined.of is None)
+        )  # fmt: skip
+        for line, (turns, steps) in zip(left, places, strict=True):
             for i, constant in enumerate(line.slots):
-                if i == 0 and is_definition:
+                if i == 0 and line.defined:
                     where[constant] = turns
                 elif constant and constant not in kept:
                     own = where[constant]
@@ -399,7 +500,7 @@ def _read_by_others(
 
 
 def _places(
-    item: Line | Loop,
+    item: Part,
     turns: tuple[int, ...],
     steps: tuple[tuple[int, ...], ...],
     count: Iterator[int],
@@ -408,11 +509,14 @@ def _places(
     if isinstance(item, Line):
         yield turns, steps
         return
+    is_loop = isinstance(item, Loop)
+    if is_loop:
+        steps = *steps, item.steps
     inside, used = [], 0
-    for line in item.lines:
-        end = used + len(line.numbers)
-        inside.append((line, (*(step[used:end] for step in steps), item.steps[used:end])))
+    for part in item.parts:
+        end = used + len(part.numbers)
+        inside.append((part, tuple(step[used:end] for step in steps)))
         used = end
-    for turn in islice(count, item.turns):
-        for line, own in inside:
-            yield from _places(line, (*turns, turn), own, count)
+    for turn in islice(count, item.turns if is_loop else 1):
+        for part, own in inside:
+            yield from _places(part, (*turns, turn) if is_loop else turns, own, count)

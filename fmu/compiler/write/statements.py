@@ -6,7 +6,7 @@ constant, or an operation: a tuple of its name and its operands.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ UNARY, TERNARY = 9, 2
 BINDING = {"*": 8, "/": 8, "+": 7, "-": 7, **dict.fromkeys(RELATIONS, 6), "==": 5, "!=": 5}
 BINDING |= {"and": 4, "or": 3}
 SYMBOLS = {"and": "&&", "or": "||"}
+PREFIXES = {"negative": "-", "not": "!", "double": "(double)"}
 COMPARED = (*RELATIONS, "==", "!=", "not")
 
 
@@ -38,12 +39,21 @@ class Place:
 
 @dataclass(eq=False, slots=True)
 class Constant:
-    """What an operation calculates; one that is not kept may stand where it is used."""
+    """What an operation calculates; one that is not kept may stand where it is used.
+
+    A variable begins with that, or without a value if it is None, and gets others.
+    """
 
     of: Operand
     c_type: str = "double"
     name: str = ""  # in the source
     is_kept: bool = False
+    is_variable: bool = False
+
+    @property
+    def declaration(self) -> str:
+        """What stands in front of its name."""
+        return f"{self.c_type} " if self.is_variable else f"const {self.c_type} "
 
     @property
     def base(self) -> str:
@@ -101,18 +111,24 @@ def constants_in(term: Operand) -> Iterator[Constant]:
             yield from constants_in(operand)
 
 
+def all_items(items: Iterable[Item]) -> Iterator[Item]:
+    """Yield items, and those of their blocks behind each."""
+    for item in items:
+        yield item
+        for body in item.bodies if isinstance(item, Block) else ():
+            yield from all_items(body)
+
+
 def places_in(item: Item) -> Iterator[Place]:
     """Yield the places that an item reads or writes, each as often."""
-    todo: list[Operand] = [*operands(item)]
-    while todo:
-        term = todo.pop()
-        if isinstance(term, Place):
-            yield term
-        elif isinstance(term, tuple):
-            todo += term[:0:-1]
-    for body in item.bodies if isinstance(item, Block) else ():
-        for inner in body:
-            yield from places_in(inner)
+    for own in all_items([item]):
+        todo: list[Operand] = [*operands(own)]
+        while todo:
+            term = todo.pop()
+            if isinstance(term, Place):
+                yield term
+            elif isinstance(term, tuple):
+                todo += term[:0:-1]
 
 
 def length(term: Operand) -> int:
@@ -126,7 +142,7 @@ def length(term: Operand) -> int:
             return len(term.before) + len(term.after)
         case Constant():
             return len(term.base)
-    is_call = term[0] not in BINDING and term[0] not in ("negative", "not", "if")
+    is_call = term[0] not in BINDING and term[0] not in (*PREFIXES, "if")
     return sum(map(length, term[1:])) + 3 * (len(term) - 2) + (len(term[0]) if is_call else 0)
 
 
@@ -152,7 +168,7 @@ def write(term: Operand, to: list[Operand], named: Named, least: int = 0) -> Non
         to.append(term)
     else:
         op, *given = term
-        if op in ("negative", "not", "if") or op in BINDING:
+        if op in PREFIXES or op == "if" or op in BINDING:
             own = {"if": TERNARY}.get(op, BINDING.get(op, UNARY))
             if op == "not" and _is(given[0], "=="):
                 (_, *given), op, own = given[0], "!=", BINDING["!="]
@@ -181,8 +197,8 @@ def _write_operator(
         for operand, sign in zip(given, (" ? ", " : ", ""), strict=True):
             write(operand, to, named, TERNARY + 1)
             to.append(sign)
-    elif op in ("negative", "not"):
-        to.append("-" if op == "negative" else "!")
+    elif op in PREFIXES:
+        to.append(PREFIXES[op])
         write(given[0], to, named, UNARY + _is(given[0], "negative"))
     else:
         left, right = given
@@ -240,6 +256,7 @@ class Folding:
         self, own: Mapping[Constant, int], uses: Mapping[Constant, int], is_long: bool
     ) -> None:
         self.own, self.uses, self.is_long = own, uses, is_long
+        self.passed: set[Constant] = set()  # in this section
         self.small: dict[Constant, Operand] = {}
         self.gone: set[Constant] = set()
         self.long_sums: set[Constant] = set()
@@ -250,6 +267,7 @@ class Folding:
             self.long_sums = _long_sums(items)
         for item in items:
             if isinstance(item, Constant):
+                self.passed.add(item)
                 item.of = with_constants(item.of, self.small)
                 if self._is_small(item):
                     self.small[item] = item.of
@@ -276,8 +294,8 @@ class Folding:
         to, found = parts[0], []
         has_name = self.is_long or isinstance(to, Constant) or isinstance(to, Place) and to.name
         for part in parts:
-            is_single = isinstance(part, Constant) and self.own.get(part) == 1 and not part.is_kept
-            if is_single and (has_name or not part.name):
+            is_own = isinstance(part, Constant) and part in self.passed and not part.is_kept
+            if is_own and self.own.get(part) == 1 and (has_name or not part.name):
                 self.gone.add(part)
                 found.append(part.of)
             else:
