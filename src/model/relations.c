@@ -326,8 +326,13 @@ static enum status refuse(const struct call *call, const struct event *event,
 /* Returns STATUS_NOT_FINITE, with the reason, if a whole number is none that an int holds. */
 static enum status check_counts(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
+    const int *counts = call->segments + model->segment_count;
+    int found = 0; // without a branch, so that compilers compare several at once
     for (int i = 0; i < model->count_count; i++) {
-        if (call->segments[model->segment_count + i] == MODEL_NO_INT) {
+        found |= counts[i] == MODEL_NO_INT;
+    }
+    for (int i = 0; found && i < model->count_count; i++) {
+        if (counts[i] == MODEL_NO_INT) {
             if (event->reason != NULL) {
                 (void)snprintf(event->reason, event->reason_size, "%s is beyond %d",
                                model->count[i].name, INT_MAX);

@@ -152,6 +152,11 @@ static inline double relations_element(const double elements[], int count, doubl
     return place >= 0.0 && place < count ? elements[(int)place] : (double)NAN;
 }
 
+/* The same of an array of whole numbers. */
+static inline double relations_count(const int elements[], int count, double place) {
+    return place >= 0.0 && place < count ? elements[(int)place] : (double)NAN;
+}
+
 /* Error of the time of a time event, over its size. */
 #define RELATIONS_TIME_ROUNDING (16.0 * DBL_EPSILON)
 

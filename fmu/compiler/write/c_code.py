@@ -81,9 +81,7 @@ class Code:
                 return self.constant(("entry", value.name, *given), name=name)
             case "element":
                 place, *row = given
-                return self.constant(
-                    ("relations_element", ("row", *row), len(row), place), name=name
-                )
+                return self.constant(element(row, place), name=name)
             case "locate":
                 return self.constant(located(self, value.name, given[0]), "int", name)
         c_type = "int" if value.op in CONDITIONS else "double"
@@ -132,6 +130,21 @@ class Code:
 def called(op: str, *given: Operand) -> Operand:
     """An operation of the graph."""
     return FUNCTIONS.get(op, op), *given
+
+
+def element(row: list[Operand], place: Operand) -> Operand:
+    """The element of a row at a place; a part of an array of C is read where it is."""
+    first, array = row[0], ("row", *row)
+    function = "relations_element"
+    if isinstance(first, Place) and first.index is not None:
+        before, after = first.before, first.after
+        following = enumerate(row, first.index)
+        if all(isinstance(x, Place) and (x.before, x.index, x.after) == (before, i, after)
+               for i, x in following):  # fmt: skip
+            array = before.removeprefix("(double)").removesuffix("[")
+            array += f" + {first.index}" if first.index else ""
+            function = "relations_count" if before.startswith("(double)") else function
+    return function, array, len(row), place
 
 
 def located(code: Code, bounds: str, x: Operand) -> Operand:

@@ -8,7 +8,7 @@ comes to hold in its modes. What all models do with that is in src/model/relatio
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 
 from ..expressions.expression import in_order
@@ -490,6 +490,8 @@ def _every_name(sampler: Sampler) -> str:
 def count(code: Code, kind: Kind, value: Value) -> Operand:
     """The int of a condition, whole number or item of an enumeration."""
     found = code.of(value)
+    if isinstance(found, Place) and found.before.startswith("(double)"):
+        return replace(found, before=found.before.removeprefix("(double)"), c_type="int")
     if kind != CONDITION:
         return "relations_whole", found
     return found if value.op in CONDITIONS and value.op != "mode" else ("!=", found, "0")
