@@ -60,6 +60,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
     "causality": {"const": "local"},
     "shown": TRUTH,
     "derivative_of": WORD,
+    "field": {"type": "string", "pattern": f"^{reader.FIELD.pattern}$"},
     "type": {"anyOf": [{"enum": [BOOLEAN, INTEGER]}, ENUMERATION]},
     "z": {"type": "array", "items": ROWS, "minItems": 2},
     "interpolation": {"enum": INTERPOLATIONS},
@@ -134,7 +135,16 @@ def _further(named: Schema) -> dict[str, Schema]:
         "events": _by_name(_change(reader.EVENT), named),
         "check": {"type": "object"} | check,
         "terminals": TERMINALS,
+        "hook": _hook(),
     }
+
+
+def _hook() -> Schema:
+    names = {"type": "array", "items": WORD, "uniqueItems": True}
+    sources = names | {"items": TEXT | {"pattern": f"^{reader.CODE.pattern}$"}}
+    reads = {"type": "object", "additionalProperties": names}
+    lists = {"sources": sources, "indicators": names, "series": names}
+    return _table(lists | {"reads": reads}, "sources")
 
 
 def _table(properties: dict[str, Schema], *needed: str) -> Schema:

@@ -131,6 +131,9 @@ def _read_hook(file: ModelFile, head: dict[str, Any]) -> None:
         file.hook = Hook(given["sources"], *lists, given.get("reads", {}))
         if missing := {*file.hook.series} - {*file.hook.indicators}:
             raise ModelFileError(f"series: {min(missing)} is none of indicators")
+        for name in file.hook.sources:
+            if not keys.CODE.fullmatch(name) or not (file.path.parent / name).is_file():
+                raise ModelFileError(f"sources: expected a C file, got {shown(name)}")
 
 
 def _check_places(file: ModelFile) -> None:
@@ -143,10 +146,18 @@ def _check_places(file: ModelFile) -> None:
             other = where.setdefault(variable.field or variable.name, variable.name)
             if other != variable.name:
                 raise ModelFileError(f"field: {shown(variable.field)} is the place of {other}")
-    for name in file.hook.indicators if file.hook else ():
-        with placed("[hook]", "indicators"):
-            if name not in file.variables or not file.variables[name].is_real:
-                raise ModelFileError(f"expected a real variable, got {shown(name)}")
+    if file.hook is None:
+        return
+    reals = {v.name for v in file.variables.values() if v.is_real}
+    read = [name for names in file.hook.reads.values() for name in names]
+    for key, names, known in (
+        ("indicators", file.hook.indicators, reals),
+        ("reads", [*file.hook.reads, *read], {*file.variables}),
+    ):
+        for name in names:
+            if name not in known:
+                what = "a real variable" if known is reals else "a variable"
+                raise ModelFileError(f"[hook]: {key}: expected {what}, got {shown(name)}")
 
 
 def _elements(

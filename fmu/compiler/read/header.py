@@ -19,6 +19,7 @@ from ..names import OF_VALUES
 from .arrays import elements
 from .content import BOOLEAN, INTEGER, ModelFile
 from .include import Source, source_of
+from .keys import FIELD
 
 GROUPS = {"inputs": "inputs", "states": "states", "discrete": "held between events"}
 CALCULATED = ("where", "outputs")  # those without a value are written by C
@@ -76,7 +77,8 @@ def fields_of(entries: Iterable[tuple[str, Any]], prefix: str) -> list[Field]:
     found: dict[tuple[str, str], list[tuple[str, tuple[int, ...], Any]]] = {}
     for name, entry in entries:
         given = entry.get("field") if isinstance(entry, dict) else None
-        path = given if isinstance(given, str) else name
+        is_path = isinstance(given, str) and FIELD.fullmatch(given)
+        path = given if is_path else name
         group, _, field = path.partition("[")[0].rpartition(".")
         found.setdefault((group, field), []).append((name, _indexes(path), entry))
     result = []

@@ -30,7 +30,7 @@ MOST_SIZE = 20_000
 LONGEST_TEXT = 1000  # characters of a description
 LONGEST_MESSAGE = 500  # bytes: src/instance/state.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
-FIELD = re.compile(r"([A-Za-z_]\w*\.)?[A-Za-z_]\w*(\[\d\])*", re.ASCII)
+FIELD = re.compile(r"([A-Za-z_][A-Za-z0-9_]*\.)?[A-Za-z_][A-Za-z0-9_]*(\[[0-9]\])*")
 CODE = re.compile(r'[^\x00-\x1f\\"]+\.[ch]')
 # files that Windows cannot have, with any suffix
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")

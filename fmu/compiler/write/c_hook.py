@@ -58,8 +58,11 @@ def parts(file: ModelFile, ranges: Mapping[str, list[Field]]) -> dict[str, list[
 
 def modes_of_values(file: ModelFile) -> list[str]:
     """Return statements that let `values` have the modes in effect at its states and inputs."""
-    places = (file.fields.value(file.of(section)[0].name) for section in ("states", "inputs"))
-    return _in_effect(file, *(f"&values->{place}" for place in places))
+    first = [file.of(section)[:1] for section in ("states", "inputs")]
+    places = [f"&values->{file.fields.value(v.name)}" for found in first for v in found]
+    return (
+        _in_effect(file, *[*places, "NULL"][:2]) if first[0] else _in_effect(file, "NULL", *places)
+    )
 
 
 def _in_effect(file: ModelFile, state: str, of_input: str) -> list[str]:
