@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rparm.console import PrintedTable
 from rparm.linearization.linear import Linear, scales
 from rparm.linearization.sampling import Tick, by_steps, hold, period
 from rparm.linearization.system import SystemSubject, connected, looped
@@ -280,11 +281,11 @@ def study_steps(path: Path, rest: Rest) -> dict[str, object]:
     """Print the limits of all ways to step a system; its part of a study of the coupling."""
     with resting(path, rest) as system:
         limits = [system.limit(way) for way in system.ways]
-    head = f"{f'largest stable step, {path.stem}':<34}  {'predicted':>11}  {'measured':>11}  result"
-    print("", head, "-" * len(head), sep="\n")
+    print()
+    columns = {"predicted": 11, "measured": 11}
+    table = PrintedTable(f"largest stable step, {path.stem}", [x.name for x in limits], columns)
     for x in limits:
-        cells = "".join(f"  {duration(step):>11}" for step in (x.predicted, x.measured))
-        print(f"{x.name:<34}{cells}  {verdict(x.passed)}", flush=True)
+        table.row(x.name, [*map(duration, (x.predicted, x.measured))], verdict(x.passed))
     return {
         "predicted": {x.name: x.predicted for x in limits},
         "measured": {x.name: x.measured for x in limits},

@@ -27,6 +27,7 @@ from rparm.models.closed_loop.coupling.study import (
 )
 from rparm.models.closed_loop.study import REST
 
+from rparm.console import PrintedTable
 from rparm.files import from_here, written
 from rparm.linearization import largest_step
 from rparm.report.pages import DASHED, GRID, INK, MUTED, STYLE, save_figure
@@ -41,11 +42,11 @@ def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
         with written(path):  # a place that cannot be written shows before anything has run
             path.parent.mkdir(parents=True, exist_ok=True)
         step_errors = study_step_errors(loop)
-        _print(step_error_lines(step_errors))
+        print_step_errors(step_errors)
         tracking = study_tracking(loop)
-        _print(tracking_lines(tracking))
+        print_tracking(tracking)
         doubling = study_doubling(loop)
-        _print(doubling_lines(doubling))
+        print_doubling(doubling)
         limits = largest_step.study_steps(ssp, REST)
     with written(path):
         save_figure(figure(step_errors, tracking, doubling), path)
@@ -78,66 +79,55 @@ def _by_method(study: StepErrors, values: np.ndarray) -> dict[str, list[float]]:
     return dict(zip(names, values.tolist(), strict=True))
 
 
-def _print(lines: list[str]) -> None:
-    """Print a table at once, after an empty line."""
-    print("", *lines, sep="\n", flush=True)
-
-
 # ---- Tables --------------------------------------------------------------------------------------
-def step_error_lines(study: StepErrors) -> list[str]:
-    steps = "".join(f"{1e3 * step:>5g} ms" for step in study.steps)
-    width = max(len(method.name) for method in study.methods)
-    blocks = (
+def print_step_errors(study: StepErrors) -> None:
+    """Print errors and energies by method and step, with their slopes."""
+    names = [method.name for method in study.methods]
+    columns = {f"{1e3 * step:g} ms": 7 for step in study.steps} | {"slope": 5}
+    for title, values in (
         ("error of the arm's states", study.errors),
-        ("energy from the coupling, J", study.energies),
-    )
-    lines = []
-    for title, values in blocks:
-        head = f"{'':<{width}}{steps} slope  result"
-        lines += [title, head, "-" * len(head)]
-        for i, (method, row) in enumerate(zip(study.methods, values, strict=True)):
-            cells = "".join(f"{short(value, 1):>8}" for value in row)
-            slope = study.slopes(values)[i]
-            good = verdict(method.expects(slope))
-            lines.append(f"{method.name:<{width}}{cells} {slope:>5.2f}  {good}")
-        lines.append("")
-    calls = "".join(f"{count:>8}" for count in study.calls[0])
-    return [*lines, f"{'calls of DoStep':<{width}}{calls}"]
+        ("energy of the coupling, J", study.energies),
+    ):
+        print()
+        table = PrintedTable(title, names, columns, gap=1)
+        for method, row, slope in zip(study.methods, values, study.slopes(values), strict=True):
+            cells = [*(short(value, 1) for value in row), f"{slope:.2f}"]
+            table.row(method.name, cells, verdict(method.expects(slope)))
+    table.row("calls of DoStep", [*map(str, study.calls[0]), ""])
 
 
-def tracking_lines(tracking: list[Tracking]) -> list[str]:
+def print_tracking(tracking: Sequence[Tracking]) -> None:
+    """Print the errors of the end effector, as measured and as predicted."""
+    print()
     title = f"end effector on the circle, {1e3 * tracking[0].step:g} ms"
-    head = f"{title:<34}  {'measured':>11}  {'predicted':>11}  deviation  result"
-    lines = [head, "-" * len(head)]
+    columns = {"measured": 11, "predicted": 11, "deviation": 9}
+    table = PrintedTable(title, [t.method.name for t in tracking], columns)
     for t in tracking:
-        good = verdict(t.predicts)
-        lines.append(
-            f"{t.method.name:<34}  {t.largest:>9.3e} m  {t.predicted.max():>9.3e} m"
-            f"  {100 * t.deviation:>7.1f} %  {good}"
-        )
-    passed = tracking_passed(tracking)
+        errors = (f"{error:.3e} m" for error in (t.largest, t.predicted.max()))
+        table.row(t.method.name, [*errors, f"{100 * t.deviation:.1f} %"], verdict(t.predicts))
     text = f"Jacobi below {LARGEST_ERROR:g} m, Gauss-Seidel smaller, all as predicted"
-    return [*lines, f"{text}: {verdict(passed)}"]
+    print(f"{text}: {verdict(tracking_passed(tracking))}", flush=True)
 
 
-def doubling_lines(doubling: list[Doubling]) -> list[str]:
-    head = "tolerance  accepted  rejected  calls  largest, median local error  global error"
-    lines = ["step doubling; local errors in tolerances", head, "-" * len(head)]
-    for d in doubling:
+def print_doubling(doubling: Sequence[Doubling]) -> None:
+    """Print what controlled steps cost and reach, and the fixed steps with the same error."""
+    names = [short(d.tolerance) for d in doubling]
+    print("\nlocal errors in tolerances")
+    columns = {"accepted": 8, "rejected": 8, "calls": 6, "largest local error": 11}
+    table = PrintedTable(
+        "step doubling", names, {**columns, "median": 6, "global error": 8}, result=0
+    )
+    for name, d in zip(names, doubling, strict=True):
         local = d.local.max() / d.tolerance, np.median(d.local[~d.run.limited]) / d.tolerance
-        lines.append(
-            f"{short(d.tolerance):>9}  {d.run.accepted:>8}  {d.run.rejected:>8}"
-            f"  {d.run.do_steps:>5}  {local[0]:>19.2f}, {local[1]:>6.2f}  {d.error:>12.2e}"
-        )
-    head = "tolerance  fixed steps   calls  times as many steps, calls  result"
-    lines += ["", "fixed steps with the same error", head, "-" * len(head)]
-    for d in doubling:
+        counts = map(str, (d.run.accepted, d.run.rejected, d.run.do_steps))
+        table.row(name, [*counts, *(f"{x:.2f}" for x in local), f"{d.error:.2e}"])
+    print("\nwith the same error")
+    columns = {"steps": 6, "calls": 6, "times the steps": 9, "times the calls": 9}
+    table = PrintedTable("fixed steps", names, columns)
+    for name, d in zip(names, doubling, strict=True):
         more = d.fixed_steps / d.run.accepted, d.fixed_calls / d.run.do_steps
-        lines.append(
-            f"{short(d.tolerance):>9}  {d.fixed_steps:>11}  {d.fixed_calls:>6}"
-            f"  {more[0]:>19.1f}, {more[1]:>5.1f}  {verdict(d.passed)}"
-        )
-    return lines
+        counts = map(str, (d.fixed_steps, d.fixed_calls))
+        table.row(name, [*counts, *(f"{x:.1f}" for x in more)], verdict(d.passed))
 
 
 # ---- Picture -------------------------------------------------------------------------------------
