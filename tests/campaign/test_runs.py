@@ -141,17 +141,6 @@ def test_events_and_counters_are_those_of_a_simulation(version: str, tmp_path: P
     assert len(counts) == 3
 
 
-def test_a_run_does_not_depend_on_those_before(tmp_path: Path) -> None:
-    given = campaign(tmp_path)
-    with runner(given, tmp_path) as (runs, job, points):
-        alone = rows(runs, job, points, [5])
-        within = rows(runs, job, points, [9, 2, 5, 7])
-        again = rows(runs, job, points, [5])
-    assert np.array_equal(alone.measures[0], within.measures[2])
-    assert np.array_equal(alone.measures, again.measures)
-    assert len(np.unique(within.measures, axis=0)) == 4
-
-
 def test_a_run_that_fails_says_why_and_harms_no_other(tmp_path: Path) -> None:
     # the mass of link 2 becomes negative in some runs, which the FMU refuses
     changes = [("normal = [-2.0, 0.2]", "uniform = [-3.0, 3.0]"), ("[keep]", "[derived]\nI1z = "

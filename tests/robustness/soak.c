@@ -1,5 +1,5 @@
 /* Long runs in which the resident memory must not grow after a warm-up: instances that come and go,
- * steps with snapshots, and loading and unloading of the shared object. */
+ * and loading and unloading of the shared object. Steps ask for no memory: real_time.c. */
 #define _GNU_SOURCE // mallinfo2, RTLD_NOLOAD
 
 #include "fmu_version.h"
@@ -141,18 +141,6 @@ static void live(unsigned long cycle) {
     fmu.FreeInstance(c);
 }
 
-/* One of three instances, each with its own method, steps on. Every tenth step is undone once, and
- * every hundredth from bytes. */
-static void step_on(unsigned long cycle) {
-    static fmi2Component instances[3];
-    const unsigned long i = cycle / 3;
-    fmi2Component *c = &instances[cycle % 3];
-    if (*c == NULL) {
-        *c = initialized(fmi2CoSimulation, (fmi2Integer)(cycle % 3) + 1);
-    }
-    (void)(i % 10 == 0 ? step_again(*c, i, i % 100 == 0) : step(*c, i));
-}
-
 static const char *paths[3]; /* this build's FMU first */
 
 /* As importers do: load, instantiate, a few steps, free, unload. Two other FMUs are loaded
@@ -186,7 +174,6 @@ static const struct campaign {
     bool loads; /* by itself */
 } campaigns[] = {
     {"life", live, false},
-    {"steps", step_on, false},
     {"reload", reload, true},
 };
 
@@ -220,6 +207,6 @@ int main(int argc, char **argv) {
             return findings == 0 ? 0 : 1;
         }
     }
-    fprintf(stderr, "usage: %s life|steps|reload CYCLES FMU.so ANOTHER.so ANOTHER.so\n", argv[0]);
+    fprintf(stderr, "usage: %s life|reload CYCLES FMU.so ANOTHER.so ANOTHER.so\n", argv[0]);
     return 2;
 }

@@ -15,15 +15,13 @@ import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rparm.errors import UserError
 from rparm.fmi import fmu_file
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.versions import Fmi2Instance
-from rparm.runs import comparison, simulation
-from rparm.runs import scenario as scenarios
+from rparm.runs import simulation
 from tests.support.paths import ROOT, SYSTEMS
 from tests.support.programs import python
 from tests.support.rparm_project import (
@@ -34,7 +32,6 @@ from tests.support.rparm_project import (
     declared,
     load,
     names_of,
-    reference_file,
     repacked,
 )
 
@@ -153,17 +150,6 @@ def test_run_without_what_windows_lacks(fmu: Path, tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, b"")
     assert b"passed: 1 scenario" in done.stdout
     assert (tmp_path / "report" / "index.html").is_file()
-
-
-def test_files_with_the_line_ends_of_windows_are_read(project: Path, fmu: Path) -> None:
-    expected = load(SHORT, project)
-    before = comparison.load_reference(expected, declared("rp_manipulator"))
-    for path in (expected.path, reference_file(project, SHORT)):
-        path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
-    scenario = scenarios.load(expected.path, declared("rp_manipulator"))
-    assert scenario.description == expected.description
-    after = comparison.load_reference(scenario, declared("rp_manipulator"))
-    assert after.names == before.names and np.array_equal(after.values, before.values)
 
 
 def test_the_scenarios_are_those_of_the_given_fmus_model(project: Path, console: Console) -> None:
