@@ -114,36 +114,6 @@ def block(k: float = STIFFNESS, c: float = 0.0, **values: float) -> dict:
     }  # fmt: skip
 
 
-def conserved(y: float) -> float:
-    """y - ln(1 + y), the same for y = c d' where a contact begins and where it ends."""
-    return y - math.log1p(y)
-
-
-def damped_exit(c: float, v: float) -> float:
-    """Velocity at which a block leaves a damped stop that it met with v; c v < 1 is not needed."""
-    low, high = 0.0, min(v, (1 - 1e-15) / c)
-    for _ in range(200):
-        middle = (low + high) / 2
-        low, high = (middle, high) if conserved(-c * middle) < conserved(c * v) else (low, middle)
-    return (low + high) / 2
-
-
-@each_method
-@pytest.mark.parametrize("c", [0.01, 0.3, 2.0])
-@pytest.mark.parametrize("v", [1.5, -1.5])
-@pytest.mark.parametrize("k", [1e3, 1e7])
-def test_hunt_and_crossley_conserve_a_function_of_velocity(
-    fmi2_plant: Fmu, method: str, c: float, v: float, k: float
-) -> None:
-    """y - ln(1 + y) is the same at y = c v_in and y = -c v_out, whatever stiffness and mass are."""
-    with started(fmi2_plant, method, **block(k=k, c=c, dq2=v)) as instance:
-        events(instance, 0.01, 0.35)
-        assert last_event(instance).count == 2
-        (dq2,) = read(instance, "dq2")
-        assert dq2 == near(-math.copysign(damped_exit(c, 1.5), v))
-        assert conserved(-c * abs(dq2)) == near(conserved(1.5 * c), 1e-8)
-
-
 @each_method
 def test_a_slide_settles_on_its_stop(fmi2_plant: Fmu, method: str) -> None:
     """Under gravity, at the depth m g / k; damping takes all the energy of the fall."""
