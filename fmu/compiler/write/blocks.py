@@ -4,23 +4,35 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 from ..expressions.expression import in_order
 from ..graph.graph import CONDITIONS, Value
 from ..plain_c.values import Conditions
-from .guards import Path, choices_in_blocks, paths, with_guards
+from .guards import Path, Plan, stripped, with_guards
 from .statements import Block, Constant, Item, Operand, store
 
 
-class Writer(Protocol):
-    """What writes an operation: Code."""
+class Writer:
+    """What writes an operation: Code, or a series."""
 
     statements: list[Item]
     known: dict[Value, Operand]
     names: Mapping[Value, str]
 
-    def operand(self, value: Value, given: Sequence[Operand], name: str = "") -> Operand: ...
+    def read(self, value: Value) -> Sequence[Value]:
+        """What is calculated before a value."""
+        return value.arguments
+
+    def beside(self, _value: Value) -> Sequence[Value]:
+        """What is calculated wherever a value is, behind it."""
+        return ()
+
+    def operand(self, value: Value, given: Sequence[Operand], name: str = "") -> Operand:
+        """Return the operand of an operation on others, after its statement."""
+        raise NotImplementedError
+
+    def chosen(self, value: Value, variable: Constant) -> None:
+        """Write what follows the block of a choice."""
 
 
 class Scope:
@@ -55,35 +67,40 @@ class Scope:
 class Blocks:
     """Operands of values and statements that calculate them."""
 
-    def __init__(self, writer: Writer, conditions: Conditions, roots: Sequence[Value]) -> None:
-        self.writer = writer
-        self.successors = with_guards(roots, conditions)
-        self.names: dict[Value, str] = {}
+    def __init__(
+        self, writer: Writer, plan: Plan, successors: Mapping[Value, Value] | None = None
+    ) -> None:
+        self.writer, self.successors = writer, successors or {}
+        self.names = {}
         for value, name in writer.names.items():
-            if value in self.successors:
-                self.names.setdefault(self.successors[value], name)
-        self.roots = [self.successors[root] for root in roots]
-        order = in_order(self.roots)
-        self.paths = paths(self.roots)
-        self.blocks = choices_in_blocks(order, self.paths)
+            self.names.setdefault(self.successors.get(value, value), name)
+        self.roots, self.paths, self.blocks = plan.roots, plan.paths, plan.choices
         self.alike: dict[tuple[Value, Path], list[Value]] = defaultdict(list)
         for value in self.blocks:
             self.alike[value.arguments[0], self.paths[value]].append(value)
         self.bits = {value: 1 << i for i, value in enumerate(self.blocks)}
-        self.users = Counter(x for value in (*order, *self.roots) for x in value.arguments)
+        self.users = Counter(x for value in (*plan.order, *plan.roots) for x in value.arguments)
         self.depends: dict[Value, int] = {}  # on values of blocks, as bits
-        for value in order if self.blocks else ():
+        for value in plan.order if self.blocks else ():
             mask = 0
-            for argument in value.arguments:
+            for argument in writer.read(value):
                 mask |= self.depends[argument] | self.bits.get(argument, 0)
             self.depends[value] = mask
         self.in_progress = 0
         self.done: set[Value] = set()  # choices that have been written
         self.partly: set[Value] = set()  # with a variable that has its value in one branch
 
+    @classmethod
+    def of_graph(cls, writer: Writer, roots: Sequence[Value], conditions: Conditions) -> Blocks:
+        """Return the blocks for values, of which those that only some cases need get guards."""
+        plain = stripped(roots, conditions)
+        found = with_guards([plain[root] for root in roots], conditions)
+        successors = {value: found[now] for value, now in plain.items() if now in found}
+        return cls(writer, Plan.of([successors[root] for root in roots]), successors)
+
     def written(self) -> tuple[list[Operand], list[Item]]:
         """Return operands of the roots, and statements; the writer knows what is always valid."""
-        scope = Scope((), set(in_order(self.roots)))
+        scope = Scope((), set(in_order(self.roots, read=self.writer.read)))
         for value, operand in self.writer.known.items():
             scope.known[self.successors.get(value, value)] = operand
         found = [self._of(root, scope) for root in self.roots]
@@ -104,7 +121,7 @@ class Blocks:
         """Return what is calculated before a value, in its block."""
         if value in self.blocks:
             return [value.arguments[0], *self._needed([value], self.paths[value])]
-        return value.arguments
+        return self.writer.read(value)
 
     def _calculate(self, value: Value, scope: Scope) -> None:
         if value in scope:  # with others
@@ -112,7 +129,7 @@ class Blocks:
         if value in self.blocks:
             self._block(value, scope)
             return
-        given = [self._of(argument, scope) for argument in value.arguments]
+        given = [self._of(argument, scope) for argument in self.writer.read(value)]
         self.writer.statements = scope.items
         operand = self.writer.operand(value, given, self.names.get(value, ""))
         if value in scope.shared and scope.outer is not None:
@@ -122,6 +139,8 @@ class Blocks:
             self.partly.add(value)
         else:
             scope.known[value] = operand
+        for other in self.writer.beside(value):
+            self._of(other, scope)
 
     def _name(self, value: Value) -> str:
         """Return the name of a value or, of a choice, of what it chooses."""
@@ -192,6 +211,9 @@ class Blocks:
             for items, given in bodies[: 1 if has_starts else 2]
         ]
         scope.items.append(Block(head, tuple(full)))
+        self.writer.statements = scope.items
+        for member, variable in zip(group, variables, strict=True):
+            self.writer.chosen(member, variable)
 
     def _inside(self, roots: list[Value], depth: int) -> set[Value]:
         """Return the values in a block that the roots follow from."""
@@ -201,7 +223,7 @@ class Blocks:
             value = todo.pop()
             if value not in found and len(self.paths[value]) >= depth:
                 found.add(value)
-                todo += value.arguments
+                todo += self.writer.read(value)
         return found
 
     def _shared(self, later: list[Value], scope: Scope, branch: int) -> set[Value]:
@@ -217,17 +239,17 @@ class Blocks:
     def _needed(self, group: list[Value], path: Path) -> list[Value]:
         """Return values that branches need and that are calculated before them, in this block."""
         members, seen, found = set(group), set(group), []
-        todo = [a for value in group[::-1] for a in value.arguments[::-1]]
+        todo = [a for value in group[::-1] for a in self.writer.read(value)[::-1]]
         while todo:
             value = todo.pop()
             if value in seen:
                 continue
             seen.add(value)
             if len(self.paths[value]) > len(path):
-                todo += value.arguments[::-1]
+                todo += self.writer.read(value)[::-1]
             elif self.paths[value] == path and value not in members and value.arguments:
                 if value.op in CONDITIONS:
-                    todo += value.arguments[::-1]
+                    todo += self.writer.read(value)[::-1]
                 else:
                     found.append(value)
         return found

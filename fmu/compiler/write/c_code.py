@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from ..expressions.expression import in_order
 from ..graph.graph import CONDITIONS, LEAVES, Value
 from ..plain_c.values import RELATION, Conditions
-from .blocks import Blocks
+from .blocks import Blocks, Writer
 from .loops import printed
 from .statements import Block, Constant, Item, Operand, Place, store
 
@@ -36,7 +36,7 @@ class Leaves(dict[tuple[str, str], Operand]):
         return Leaves({**self, **own}, self.names, self.arrays, self.conditions)
 
 
-class Code:
+class Code(Writer):
     """Statements, each value once; values that do not move are calculated in an `outer` code.
 
     names: of more values than the source has names for.
@@ -113,7 +113,8 @@ class Code:
     def assign(self, values: Mapping[Place, Value]) -> Code:
         """Give places their values, after all of them have been calculated."""
         before = self.statements
-        given, statements = Blocks(self, self.leaves.conditions, [*values.values()]).written()
+        blocks = Blocks.of_graph(self, [*values.values()], self.leaves.conditions)
+        given, statements = blocks.written()
         self.statements = [*before, *statements, *map(store, values, given)]
         return self
 

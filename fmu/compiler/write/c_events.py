@@ -47,12 +47,13 @@ def leaves(file: ModelFile) -> Leaves:
         found["second", v.name] = field_of("second", field, f"dd_{v.name}")
     for name, kind in file.kinds.items():
         field = file.fields.count(name)
-        leaf = file.graph.value("mode" if kind == CONDITION else "integer", name=name)
-        if isinstance(kind, tuple):
-            conditions.domains[leaf] = frozenset(range(1, 1 + len(kind)))
-        is_int = kind == CONDITION or leaf in conditions.domains
-        given = ("values", field, name, "int") if is_int else ("(double)values", field, name)
-        found[leaf.op, name] = field_of(*given)
+        if kind == CONDITION:
+            found["mode", name] = field_of("values", field, name, "int")
+        elif (numbers := file.variables[name].numbers) is not None:
+            conditions.domains[file.graph.value("integer", name=name)] = frozenset(numbers)
+            found["integer", name] = field_of("values", field, name, "int")
+        else:
+            found["integer", name] = field_of("(double)values", field, name)
     for i, name in enumerate(file.graph.segments):
         found["integer", name] = Place("values->segments[", i, "]")
     for i, name in enumerate(file.graph.relations):

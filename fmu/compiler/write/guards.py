@@ -8,7 +8,7 @@ efforts, energies and loads read it under conditions of their own.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..expressions.expression import in_order
@@ -39,20 +39,41 @@ def cost(value: Value) -> int:
     return COSTS.get(value.op, OF_FUNCTION)
 
 
+@dataclass(frozen=True)
+class Plan:
+    """Values that are calculated in the order of what they read, each in the branch of its path.
+
+    choices: those with calculations in a branch; the others are `?:`.
+    """
+
+    roots: list[Value]
+    order: list[Value]
+    paths: Mapping[Value, Path]
+    choices: list[Value]
+
+    @classmethod
+    def of(cls, roots: list[Value]) -> Plan:
+        """Return the plan for values of a graph."""
+        order, found = in_order(roots), paths(roots)
+        return cls(roots, order, found, choices_in_blocks(order, found))
+
+
 def with_guards(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value]:
     """Put values that only some cases need behind choices; map each to its successor."""
     order = in_order(roots)
     if not any(value.op == "if" for value in order):
         return {value: value for value in order}
-    plain = stripped(roots, conditions)
-    conditions.learn(plain.values())
-    found = guarded([plain[root] for root in roots], conditions)
-    return {value: found[now] for value, now in plain.items() if now in found}
+    conditions.learn(order)
+    return guarded(roots, conditions)
 
 
-def choices_in_blocks(order: Iterable[Value], places: Mapping[Value, Path]) -> list[Value]:
-    """Return choices with calculations in a branch; the others are `?:`."""
-    inside = costs_inside(order, places)
+def choices_in_blocks(
+    order: Iterable[Value],
+    places: Mapping[Value, Path],
+    cost_of: Callable[[Value], int] | None = None,
+) -> list[Value]:
+    """Return choices with calculations in a branch."""
+    inside = costs_inside(order, places, cost_of or cost)
     return [
         value for value in order
         if value.op == "if" and inside[places[value], value.arguments[0]] > MOST_CHOSEN
@@ -122,14 +143,14 @@ def known_on(path: Path, conditions: Conditions) -> Known:
 
 
 def costs_inside(
-    values: Iterable[Value], places: Mapping[Value, Path]
+    values: Iterable[Value], places: Mapping[Value, Path], cost_of: Callable[[Value], int]
 ) -> Counter[tuple[Path, Value]]:
     """Return the cost of both branches of each condition, by its place."""
     found: Counter[tuple[Path, Value]] = Counter()
     for value in values:
         path = places[value]
         for i in range(len(path)):
-            found[path[:i], path[i][0]] += cost(value)
+            found[path[:i], path[i][0]] += cost_of(value)
     return found
 
 
@@ -213,7 +234,7 @@ class Guards:
         """Return conditions that are stronger than the uses' and worth a branch."""
         found: dict[Value, Value] = {}
         costs: Counter[tuple[Path, Value]] = Counter()
-        inside = costs_inside(self.order, self.paths)
+        inside = costs_inside(self.order, self.paths, cost)
         for value in self.order:
             if cost(value) == 0 and value.op != "if":
                 continue
