@@ -18,12 +18,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from compiler.interface import Declaration
 from compiler.names import OF_VALUES
 from compiler.read.content import ModelFileError
 from compiler.read.model_file import ModelFile
 from compiler.write import declaration, lock
-from declaration.c_tables import value_references, variable_table
-from declaration.load import Declaration, assemble, check
+from compiler.write.c_tables import value_references, variable_table
 from document import document
 from fmi2.model_description import model_description as fmi2_description
 from fmi3.model_description import terminals_and_icons
@@ -65,7 +65,7 @@ class Hook:
 def write_c(file: ModelFile, references: dict[lock.Key, int], folder: Path) -> Declaration:
     """Write all files that the FMUs are made of; its declaration."""
     _write(folder, declaration.generated(file))
-    declared = assemble(file.path, check(file.path, declaration.declared(file, references)))
+    declared = declaration.declared(file, references)
     tables = {"variables.c": variable_table, "value_references.h": value_references}
     _write(folder, {name: table(declared) for name, table in tables.items()})
     return declared

@@ -12,8 +12,7 @@ from pathlib import Path
 from compiler.plain_c.text import CTextError, read
 from compiler.read.header import made, origin
 from compiler.write.derived import FORM, Derived, Wanted
-from generate import write_if_changed
-from program import program
+from program import program, write_if_changed
 from source_code import dependencies
 
 

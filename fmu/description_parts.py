@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from declaration.load import Declaration
-from declaration.schema import Boolean, Display, Enumeration, Float64, UnitEntry, Variable
+from compiler.interface import Declaration, Display, Variable
+from compiler.units import DISPLAYED, parsed
 from jinja2 import Environment, FileSystemLoader
 from markupsafe import Markup
 from program import Provenance
@@ -20,31 +20,33 @@ def described(
     version: str, declaration: Declaration, provenance: Provenance, **values: object
 ) -> str:
     """Return the text of modelDescription.xml; `values`: what this version of FMI adds."""
-    model = declaration.model
     origin = {
-        "description": model.description,
+        "description": declaration.description,
         "author": provenance.author,
         "version": provenance.version,
         "copyright": provenance.copyright,
         "license": provenance.license,
-        "generationTool": f"{model.name} {provenance.version}",
+        "generationTool": f"{declaration.name} {provenance.version}",
         "generationDateAndTime": provenance.date,
     }
-    shared = {"declaration": declaration, "model": model, "origin": origin, "prefix": version}
+    shared = {"declaration": declaration, "origin": origin, "prefix": version}
+    shared["displays"] = {unit: display_units(unit, declaration) for unit in declaration.units}
     return filled(f"{version}/modelDescription.xml.in", **shared, **values)
 
 
-def display_units(unit: UnitEntry) -> list[Display]:
+def display_units(unit: str, declaration: Declaration) -> list[Display]:
     """Return the display units of a unit: those of all its variables, and those of some."""
-    displays = {name: Display(name=name, factor=f) for name, f in unit.display.items()}
-    return [*(displays | unit.further).values()]
+    usual = DISPLAYED.get(unit, ())
+    found = {name: Display(name, float(1 / parsed(name).factor)) for name in usual}
+    own = [v.display for v in declaration.variables.values() if v.unit == unit and v.display]
+    return [*(found | {display.name: display for display in own}).values()]
 
 
-def display_unit(variable: Float64, units: Mapping[str, UnitEntry]) -> str | None:
+def display_unit(variable: Variable) -> str | None:
     """Return the name of the display unit of a variable, if it has one."""
     if variable.display:
         return variable.display.name
-    return next(iter(units[variable.unit].display), None)
+    return next(iter(DISPLAYED.get(variable.unit, ())), None)
 
 
 def type_names(variables: Mapping[str, Variable]) -> dict[str, str]:
@@ -54,7 +56,7 @@ def type_names(variables: Mapping[str, Variable]) -> dict[str, str]:
     """
     names: dict[str, str] = {}
     taken = set(variables)
-    for variable in (name for name, v in variables.items() if isinstance(v, Enumeration)):
+    for variable in (name for name, v in variables.items() if v.type == "enumeration"):
         words = variable.split("_")
         name = "".join(word[:1].upper() + word[1:] for word in words) + "Type"
         while name in taken:
@@ -66,7 +68,7 @@ def type_names(variables: Mapping[str, Variable]) -> dict[str, str]:
 
 def values(variable: Variable) -> dict[str, object]:
     """Return attributes reinit, start, min and max, None for those that the variable lacks."""
-    keys = ("start",) if isinstance(variable, Boolean) else ("start", "min", "max")
+    keys = ("start",) if variable.type == "boolean" else ("start", "min", "max")
     found = {key: getattr(variable, key) for key in keys}
     return {"reinit": variable.reinit or None, **found}
 
@@ -90,4 +92,4 @@ _templates = Environment(
     lstrip_blocks=True,
     keep_trailing_newline=True,
 )
-_templates.filters |= {"attributes": attributes, "display_units": display_units, "quoted": quoted}
+_templates.filters |= {"attributes": attributes, "quoted": quoted}

@@ -32,7 +32,7 @@ def main() -> int:
     parser.add_argument("--of-this-machine", action="store_true", help=text)
     arguments = parser.parse_args()
     try:
-        file = read(arguments.file, declaration.solver_names())
+        file = read(arguments.file)
         lock_file = lock.path_of(arguments.file)
         references = lock.references(lock_file, declaration.keys(file))
         runtimes = [Runtime.load(path, arguments.of_this_machine) for path in arguments.runtime]

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 from compiler.read.model_file import ModelFileError, read
-from compiler.write import declaration
 from compiler.write.motion import motion
 from program import WrongInputError
 
@@ -18,7 +17,7 @@ def main() -> int:
     parser.add_argument("--output", type=Path, help="a file for it")
     arguments = parser.parse_args()
     try:
-        text = json.dumps(motion(read(arguments.file, declaration.solver_names())))
+        text = json.dumps(motion(read(arguments.file)))
         if arguments.output:
             arguments.output.write_text(text, encoding="utf-8")
         else:

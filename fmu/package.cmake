@@ -1,11 +1,10 @@
-# add_fmu(NAME FOLDER models/... LIBRARY target [REFERENCES scenario ...] [VERSIONS fmi2 fmi3])
-# add_fmu(NAME EQUATIONS file.toml [FOLDER models/...] [LIBRARY target] ...)
+# add_fmu(NAME EQUATIONS file.toml [FOLDER models/...] [LIBRARY target] [REFERENCES scenario ...] [VERSIONS fmi2 fmi3])
+# add_fmu(NAME BY_HAND file.toml LIBRARY target [FOLDER models/...] ...)
 #
 # Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or the one of them that
-# VERSIONS names, from the model's folder (variables.toml, README.md; model.png and pictures of the README
-# where there are any) and the library that defines its struct model. EQUATIONS: a file with equations in place of
-# both, with its lock file; the folder may have a page and pictures, and the library then has the C of its hook. The archive carries inputs and
-# references of the scenarios after REFERENCES. Targets:
+# VERSIONS names, from the model's file and its lock file. The folder may have a page, README.md, pictures of it, and
+# model.png. The library has the C of the hook of a file with equations or, BY_HAND, the struct model of which the file
+# declares the variables. The archive carries inputs and references of the scenarios after REFERENCES. Targets:
 #   NAME_equations             the library with the struct model of EQUATIONS
 #   NAME, NAME_fmi3            the shared objects
 #   NAME_fmu, NAME_fmi3_fmu    the archives
@@ -57,26 +56,15 @@ function(add_fmu_library name target version description folder)
   add_dependencies(libraries ${target})
 endfunction()
 
-# The library NAME_equations, and variables.toml and README.md beside its sources in the folder.
-function(add_equations name file folder)
-  cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY ${PROJECT_SOURCE_DIR})
-  cmake_path(REPLACE_EXTENSION file LAST_ONLY .lock.toml OUTPUT_VARIABLE lock)
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/*.py ${FMU_SOURCE_DIR}/compiler/*/*
-       ${FMU_SOURCE_DIR}/declaration/*
-       ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
-  add_custom_command(
-    OUTPUT ${folder}/equations.c ${folder}/equations.h ${folder}/variables.toml ${folder}/README.md
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} --output ${folder}
-            --depfile ${folder}/files.d
-    DEPENDS ${file} ${lock} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/program.py
-    DEPFILE ${folder}/files.d
-    COMMENT "Generating the equations of ${name}"
-    VERBATIM)
-  add_library(${name}_equations STATIC ${folder}/equations.c)
+# The library NAME_equations of a generated file.
+function(add_equations name source)
+  cmake_path(GET source PARENT_PATH folder)
+  add_library(${name}_equations STATIC ${source})
   target_include_directories(${name}_equations PUBLIC ${folder})
   target_compile_options(${name}_equations PRIVATE -w) # what warnings are about, nobody has written
   target_link_libraries(${name}_equations PUBLIC model_interface PRIVATE relations elementary_functions
                         $<LINK_ONLY:integrator>) # the solver of a band
+  add_dependencies(${name}_equations ${name}_generated)
 endfunction()
 
 # NAME_values.h, which the C files of models include, of NAME.toml.
@@ -87,9 +75,9 @@ function(add_values_header target file)
   file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/*.py ${FMU_SOURCE_DIR}/compiler/read/*.py)
   add_custom_command(
     OUTPUT ${output}
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} --header
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${file} --header
             --output ${CMAKE_CURRENT_BINARY_DIR} --depfile ${output}.d
-    DEPENDS ${file} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py
+    DEPENDS ${file} ${generator} ${FMU_SOURCE_DIR}/generate.py
     DEPFILE ${output}.d
     COMMENT "Making ${name}_values.h"
     VERBATIM)
@@ -104,58 +92,58 @@ function(add_values_header target file)
 endfunction()
 
 function(add_fmu name)
-  cmake_parse_arguments(ARG "" "EQUATIONS;FOLDER;LIBRARY" "REFERENCES;VERSIONS" ${ARGN})
+  cmake_parse_arguments(ARG "" "EQUATIONS;BY_HAND;FOLDER;LIBRARY" "REFERENCES;VERSIONS" ${ARGN})
   if(NOT ARG_VERSIONS)
     set(ARG_VERSIONS ${FMI_VERSIONS})
   endif()
   set_property(DIRECTORY APPEND PROPERTY FMUS ${name})
-  set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
   set(out ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name})
-  set(generated ${out}/modelDescription.xml ${out}/fmi3/modelDescription.xml ${out}/terminalsAndIcons.xml
-                ${out}/variables.c ${out}/value_references.h)
-  set(variables ${folder}/variables.toml)
-  set(readme ${folder}/README.md)
+  set(folder ${out})
   set(icon "")
-  set(copy_icon "")
   if(ARG_FOLDER)
+    set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
     file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
   endif()
+  set(readme ${folder}/README.md)
+  set(generated ${out}/modelDescription.xml ${out}/fmi3/modelDescription.xml ${out}/terminalsAndIcons.xml
+                ${out}/variables.c ${out}/value_references.h)
+
+  # tables, model descriptions and equations
+  set(model ${ARG_EQUATIONS}${ARG_BY_HAND})
+  cmake_path(ABSOLUTE_PATH model BASE_DIRECTORY ${PROJECT_SOURCE_DIR})
+  cmake_path(REPLACE_EXTENSION model LAST_ONLY .lock.toml OUTPUT_VARIABLE lock)
+  set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${model}
+               --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
   if(ARG_EQUATIONS)
-    if(NOT ARG_FOLDER)
-      set(folder ${out}/model)
-      set(readme ${folder}/README.md)
-    endif()
-    add_equations(${name} ${ARG_EQUATIONS} ${out}/model)
+    list(APPEND generated ${out}/equations.c ${out}/equations.h ${out}/README.md)
+  else()
+    list(APPEND generate --by-hand)
+  endif()
+  if(icon)
+    list(APPEND generate --icon ${icon})
+  endif()
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/compiler/*.py ${FMU_SOURCE_DIR}/compiler/*/*
+       ${FMU_SOURCE_DIR}/fmi*/*.py ${FMU_SOURCE_DIR}/*.xml.in ${FMU_SOURCE_DIR}/fmi*/*.xml.in
+       ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
+  foreach(module generate description_parts program source_code)
+    list(APPEND generator ${FMU_SOURCE_DIR}/${module}.py)
+  endforeach()
+  set(declaration ${model} ${lock} ${icon} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
+  add_custom_command(
+    OUTPUT ${generated}
+    COMMAND ${generate} --output ${out} --depfile ${out}/files.d
+    DEPENDS ${declaration}
+    DEPFILE ${out}/files.d
+    COMMENT "Generating ${name}"
+    VERBATIM)
+  add_custom_target(${name}_generated DEPENDS ${generated})
+  if(ARG_EQUATIONS)
+    add_equations(${name} ${out}/equations.c)
     if(ARG_LIBRARY) # each calls the other
       target_link_libraries(${name}_equations PUBLIC ${ARG_LIBRARY})
       target_link_libraries(${ARG_LIBRARY} INTERFACE ${name}_equations)
     endif()
     set(ARG_LIBRARY ${name}_equations)
-    set(variables ${out}/model/variables.toml)
-    if(icon) # the generator looks for it beside variables.toml
-      set(copy_icon COMMAND ${CMAKE_COMMAND} -E copy ${icon} ${out}/model)
-    endif()
-  endif()
-
-  # tables and model descriptions, again whenever a declaration changes
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/compiler/units.py
-       ${FMU_SOURCE_DIR}/fmi*/*.py ${FMU_SOURCE_DIR}/*.xml.in ${FMU_SOURCE_DIR}/fmi*/*.xml.in)
-  list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/program.py)
-  set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${variables}
-               --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
-  file(GLOB declarations CONFIGURE_DEPENDS
-    ${PROJECT_SOURCE_DIR}/src/instance/*.toml ${PROJECT_SOURCE_DIR}/models/*/variables.toml) # they include each other
-  set(declaration ${variables} ${icon} ${declarations} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
-  add_custom_command(
-    OUTPUT ${generated}
-    ${copy_icon}
-    COMMAND ${generate} --output ${out}
-    DEPENDS ${declaration}
-    COMMENT "Generating the interface of ${name}"
-    VERBATIM)
-  add_custom_target(${name}_generated DEPENDS ${generated})
-  if(ARG_EQUATIONS)
-    add_dependencies(${name}_generated ${name}_equations) # they have a command in common
   endif()
   add_library(${name}_interface INTERFACE)
   target_include_directories(${name}_interface INTERFACE ${out})
@@ -197,9 +185,9 @@ function(add_fmu name)
     endforeach()
     add_custom_command(
       OUTPUT ${references}
-      COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/references.py ${variables} ${ARG_REFERENCES}
+      COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/references.py ${out}/modelDescription.xml ${ARG_REFERENCES}
               --folder ${folder} --output ${out}/references
-      DEPENDS ${FMU_SOURCE_DIR}/references.py ${generator} ${declaration} ${reference_files}
+      DEPENDS ${FMU_SOURCE_DIR}/references.py ${generator} ${out}/modelDescription.xml ${reference_files}
       COMMENT "Collecting the references of ${name}"
       VERBATIM)
   endif()

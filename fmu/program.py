@@ -56,6 +56,13 @@ def atomic_write(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def write_if_changed(path: Path, text: str) -> None:
+    """Write a file unless it has this text already, so that nothing is rebuilt for it."""
+    if not path.is_file() or path.read_bytes() != text.encode():
+        with atomic_write(path) as temporary:
+            temporary.write_bytes(text.encode())
+
+
 @dataclass(frozen=True)
 class Provenance:
     """Texts for the model description; None is left out of it."""

@@ -8,13 +8,12 @@ says what each file is (FMI Layered Standard References 1.0.0-alpha.1).
 import argparse
 import sys
 import tomllib
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from declaration.load import Declaration, load
-from declaration.schema import Boolean, Enumeration, Float64, Variable
 from description_parts import filled
 from program import WrongInputError, atomic_write, program
 
@@ -62,32 +61,48 @@ def read(path: Path) -> Scenario:
     return Scenario(path.stem, path, title, parameters | initial)
 
 
-def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
+def parameter_set(scenario: Scenario, description: ET.Element) -> str:
     """Text of the .ssv (SSP 1.0) with the values that are not the start values of the FMU."""
+    scalars = description.iterfind("ModelVariables/ScalarVariable")
+    variables = {scalar.get("name"): scalar[0] for scalar in scalars}
     values, units = {}, set()
     for name, value in scenario.values.items():
-        variable = declaration.variables.get(name)
+        variable = variables.get(name)
         if variable is None:
             raise WrongInputError(f"{scenario.path}: '{name}' is not declared")
-        values[name] = typed(variable, value, f"{scenario.path}: {name}")
-        units |= {variable.unit} if isinstance(variable, Float64) else set()
-    exponents = {name: declaration.units[name] for name in sorted(units)}
+        items = items_of(description, variable.get("declaredType"))
+        values[name] = typed(variable, items, value, f"{scenario.path}: {name}")
+        units |= {variable.get("unit")} - {None}
+    exponents = {unit: exponents_of(description, unit) for unit in sorted(units)}
     return filled("parameters.ssv.in", scenario=scenario, values=values, units=exponents)
 
 
-def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, Any]]:
+def items_of(description: ET.Element, name: str | None) -> list[str | None]:
+    """Return the items of a type, if it is an enumeration."""
+    path = f"TypeDefinitions/SimpleType[@name='{name}']/Enumeration/Item"
+    return [item.get("name") for item in description.iterfind(path)]
+
+
+def exponents_of(description: ET.Element, unit: str) -> dict[str, str]:
+    """Return the exponents of the SI base units."""
+    return description.find(f"UnitDefinitions/Unit[@name='{unit}']/BaseUnit").attrib
+
+
+def typed(
+    variable: ET.Element, items: Sequence[str | None], value: Any, place: str
+) -> tuple[str, dict[str, Any]]:
     """Return the element for a value, with its attributes."""
-    if isinstance(variable, Enumeration):
-        if not isinstance(value, str) or value not in variable.items:
-            known = ", ".join(variable.items)
-            raise WrongInputError(f"{place} = {value!r:.40} is not one of {known}")
-        return "Enumeration", {"value": value}
-    wanted = {"float64": (int, float), "int32": (int,), "boolean": (bool,)}
-    if type(value) not in wanted[variable.type]:
-        raise WrongInputError(f"{place} = {value!r:.40} is not a value of type {variable.type}")
-    if isinstance(variable, Float64):
-        return "Real", {"value": float(value), "unit": variable.unit}
-    return "Boolean" if isinstance(variable, Boolean) else "Integer", {"value": value}
+    kind = variable.tag
+    if kind == "Enumeration":
+        if value not in items:
+            raise WrongInputError(f"{place} = {value!r:.40} is not one of {', '.join(items)}")
+        return kind, {"value": value}
+    wanted = {"Real": (int, float), "Integer": (int,), "Boolean": (bool,)}
+    if type(value) not in wanted[kind]:
+        raise WrongInputError(f"{place} = {value!r:.40} is not a value of type {kind}")
+    if kind == "Real":
+        return kind, {"value": float(value), "unit": variable.get("unit")}
+    return kind, {"value": value}
 
 
 def file_name(model: str, ending: str) -> str:
@@ -96,10 +111,10 @@ def file_name(model: str, ending: str) -> str:
 
 
 def files(
-    declaration: Declaration, names: Sequence[str], folder: Path
+    description: ET.Element, names: Sequence[str], folder: Path
 ) -> Iterator[tuple[str, bytes]]:
     """Return name and content of each file; folder: of the model."""
-    model = declaration.model.name
+    model = description.get("modelName", "")
     scenarios = [read(folder / "scenarios" / f"{name}.toml") for name in names]
     named = {"model": model, "scenarios": scenarios, "files": FILES, "file_name": file_name}
     yield MANIFEST, filled(f"{MANIFEST}.in", **named).encode()
@@ -107,7 +122,7 @@ def files(
         for ending in FILES:
             name = file_name(model, ending)
             if ending == PARAMETERS:
-                content = parameter_set(scenario, declaration).encode()
+                content = parameter_set(scenario, description).encode()
             else:
                 content = content_of(folder / "references" / scenario.name / name)
             yield f"{scenario.name}/{name}", content
@@ -123,14 +138,13 @@ def write(output: Path, contents: Mapping[str, bytes]) -> None:
 @program()
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("variables", type=Path, help="variables.toml of the model")
+    parser.add_argument("description", type=Path, help="modelDescription.xml of FMI 2.0")
     parser.add_argument("names", nargs="+", metavar="NAME", help="scenarios of the model")
-    parser.add_argument("--folder", type=Path, help="of the model, if variables.toml is elsewhere")
+    parser.add_argument("--folder", type=Path, required=True, help="folder of the model")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
     arguments = parser.parse_args()
-    declaration = load(arguments.variables)
-    folder = arguments.folder or arguments.variables.parent
-    write(arguments.output, dict(files(declaration, arguments.names, folder)))
+    description = ET.parse(arguments.description).getroot()
+    write(arguments.output, dict(files(description, arguments.names, arguments.folder)))
 
 
 if __name__ == "__main__":

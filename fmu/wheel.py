@@ -32,7 +32,7 @@ OF_FMU += ("src/instance/*.toml",)
 OF_RELEASES = ("bill_of_materials", "built", "derive", "pieces", "references", "wheel")
 OF_RELEASES += ("blocks", "derived")  # of the compiler: they write C of models
 # the FMUs are there, with their pictures
-OF_DEVELOPERS = ("variables.toml", "model.svg", "make_references.py", "reference_files.py")
+OF_DEVELOPERS = ("model.svg", "make_references.py", "reference_files.py")
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 FOR_TESTS += tuple(f"{name}/monolithic" for name in ("payload", "integral", "plane", "effort"))
 

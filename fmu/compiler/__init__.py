@@ -3,6 +3,7 @@
 A folder or module imports only from lines above its own:
 
     units         symbols of units, and what numbers with them are in SI
+    interface     what an FMU declares: variables, units, terminals
     expressions   what users write, and its dimensions
     graph         operations on values and conditions, and their derivatives; tables
     names         names in C that follow from a file and its variables

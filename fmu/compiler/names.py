@@ -26,6 +26,16 @@ class Field(str):
         return field
 
 
+class OwnFields:
+    """Fields in C by hand, which have the names of their variables."""
+
+    def value(self, name: str) -> Field:
+        """A variable of any kind."""
+        return Field(name.replace(",", "]["))
+
+    count = value
+
+
 class Fields:
     """Names in C of variables: elements of one array that follow each other share an array of C."""
 

@@ -15,10 +15,10 @@ from .graph.tables import INTERPOLATIONS, OUTSIDE
 from .read import keys as reader
 from .read.arrays import FOR
 from .read.content import BOOLEAN, FOLLOWS, INTEGER, SWITCHES
+from .read.file import solver_names
 from .read.header import CALCULATED
 from .read.include import INCLUDED
 from .units import ANGLE, BASE
-from .write import declaration
 
 Schema = dict[str, Any]
 PAGE = Path(__file__).parents[2] / "examples" / "models" / "README.md"
@@ -70,7 +70,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
 
 def schema() -> Schema:
     """Return the schema, with descriptions from the page."""
-    names = "|".join(sorted({*reader.RESERVED, *declaration.solver_names()}))
+    names = "|".join(sorted({*reader.RESERVED, *solver_names()}))
     named = {"not": {"pattern": rf"^\s*({names})\s*(\[|$)|^der_"}}
     rows = re.findall(r"^\| `\[?(\w+)[^|]*\| (.*) \|$", PAGE.read_text("utf-8"), re.MULTILINE)
     about = {key: re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text) for key, text in rows}

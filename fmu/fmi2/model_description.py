@@ -1,9 +1,9 @@
 """Writes modelDescription.xml of FMI 2.0 (section 2.2 of the specification)."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from declaration.load import Declaration, DeclarationError
-from declaration.schema import Float64, Variable
+from compiler.interface import Declaration, Variable
 from description_parts import described, display_unit, type_names, values
 from program import Provenance
 
@@ -20,11 +20,10 @@ def model_description(
     def typed(variable: Variable, type_name: str | None) -> dict[str, object]:
         """Return the attributes of the element of the variable's type."""
         keys = {"declaredType": type_name or None}
-        if isinstance(variable, Float64):
-            shown = display_unit(variable, declaration.units)
-            keys |= {"unit": variable.unit, "displayUnit": shown}
+        if variable.unit:
+            keys |= {"unit": variable.unit, "displayUnit": display_unit(variable)}
         keys |= {"derivative": index.get(variable.derivative_of), **values(variable)}
-        return {**keys, "nominal": getattr(variable, "nominal", None)}
+        return {**keys, "nominal": variable.nominal}
 
     return described(
         "fmi2",
@@ -53,19 +52,15 @@ def with_aliases(declaration: Declaration) -> dict[str, Variable]:
         variables[name] = variable
         if variable.derivative_of is None or variable.initial != "exact":
             continue
-        variables[name] = variable.model_copy(update={"derivative_of": None})
-        alias = f"der_{variable.derivative_of}"
-        if alias in declaration.variables:
-            place = f"{declaration.path}: variable {alias}"
-            raise DeclarationError(f"{place}: FMI 2.0 needs the name for an alias of {name}")
-        changes = {
-            "causality": "local",
-            "initial": "calculated",
-            "start": None,
-            "reinit": False,
-            "description": f"Time derivative of {variable.derivative_of}: alias of {name}",
-        }
-        variables[alias] = variable.model_copy(update=changes)
+        variables[name] = replace(variable, derivative_of=None)
+        variables[f"der_{variable.derivative_of}"] = replace(
+            variable,
+            causality="local",
+            initial="calculated",
+            start=None,
+            reinit=False,
+            description=f"Time derivative of {variable.derivative_of}: alias of {name}",
+        )
     return variables
 
 
@@ -86,10 +81,10 @@ def structure(
     derivatives = {name: v for name, v in calculated.items() if v.derivative_of}
     later = {"Outputs": outputs, "Derivatives": derivatives}
     knowns = {
-        section: {name: v.dependencies or [] for name, v in of_section.items()}
+        section: {name: v.dependencies or () for name, v in of_section.items()}
         for section, of_section in later.items()
     }
-    knowns["InitialUnknowns"] = {n: v.initial_knowns(variables) for n, v in calculated.items()}
+    knowns["InitialUnknowns"] = {n: v.initial_knowns for n, v in calculated.items()}
     return {
         section: {
             index[name]: sorted(index[known] for known in of_unknown)

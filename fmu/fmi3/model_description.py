@@ -5,8 +5,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from declaration.load import Declaration
-from declaration.schema import Float64, Variable
+from compiler.interface import Declaration, Variable
 from description_parts import described, display_unit, filled, type_names, values
 from program import Provenance
 
@@ -18,15 +17,14 @@ PNG_START = b"\x89PNG\r\n\x1a\n"
 def model_description(declaration: Declaration, provenance: Provenance) -> str:
     variables = declaration.variables
     types = type_names(variables)
-    floats = {float_type_name(v): v for v in variables.values() if isinstance(v, Float64)}
+    floats = {float_type_name(v): v for v in variables.values() if v.unit}
 
     def keys(name: str, variable: Variable) -> dict[str, object]:
         """Return the attributes of a variable."""
         found = {"name": name, "valueReference": variable.reference}
         texts = ("description", "causality", "variability", "initial")
         found |= {key: getattr(variable, key) for key in texts}
-        is_float = isinstance(variable, Float64)
-        found["declaredType"] = float_type_name(variable) if is_float else types.get(name)
+        found["declaredType"] = float_type_name(variable) if variable.unit else types.get(name)
         found["intermediateUpdate"] = has_intermediate_update(variable) or None
         if variable.derivative_of is not None:
             found["derivative"] = variables[variable.derivative_of].reference
@@ -41,12 +39,12 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
         floats=floats,
         names=TYPES,
         keys=keys,
-        shown=lambda variable: display_unit(variable, declaration.units),
+        shown=display_unit,
         structure=structure(declaration),
     )
 
 
-def float_type_name(variable: Float64) -> str:
+def float_type_name(variable: Variable) -> str:
     """Return the name of the type of a floating-point number, for example "Float64 in rad/s"."""
     nominal = "" if variable.nominal is None else f", nominal {variable.nominal!r}"
     shown = "" if variable.display is None else f", shown in {variable.display.name}"
@@ -55,7 +53,7 @@ def float_type_name(variable: Float64) -> str:
 
 def has_intermediate_update(variable: Variable) -> bool:
     """Return whether the variable can be accessed inside a step, as fmi3.c has it."""
-    is_continuous = isinstance(variable, Float64) and variable.variability == "continuous"
+    is_continuous = variable.variability == "continuous"
     return is_continuous and variable.owner == "model" and variable.causality in ("input", "output")
 
 
@@ -68,19 +66,17 @@ def structure(declaration: Declaration) -> Iterator[tuple[str, int, list[int]]]:
         ("Output", [n for n, v in variables.items() if v.causality == "output"]),
         ("ContinuousStateDerivative", [derivatives[n] for n in variables if n in derivatives]),
         ("InitialUnknown", calculated),
-        ("EventIndicator", declaration.model.event_indicators),
+        ("EventIndicator", declaration.indicators),
     ):
         for unknown in map(variables.__getitem__, names):
-            later = (unknown.dependencies or []) + unknown.parameters
-            is_initial = section == "InitialUnknown"
-            knowns = unknown.initial_knowns(variables) if is_initial else later
+            later = (*(unknown.dependencies or ()), *unknown.parameters)
+            knowns = unknown.initial_knowns if section == "InitialUnknown" else later
             yield section, unknown.reference, sorted(variables[x].reference for x in knowns)
 
 
-def terminals_and_icons(declaration: Declaration) -> str:
-    """Return the text of terminalsAndIcons.xml; the icon is model.png beside the declaration."""
-    icon = declaration.path.with_name("model.png")
-    corners = icon_corners(icon) if icon.is_file() else None
+def terminals_and_icons(declaration: Declaration, icon: Path | None = None) -> str:
+    """Return the text of terminalsAndIcons.xml; icon: a picture in PNG."""
+    corners = icon_corners(icon) if icon else None
     template = "fmi3/terminalsAndIcons.xml.in"
     return filled(template, corners=corners, terminals=declaration.terminals)
 

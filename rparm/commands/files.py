@@ -52,15 +52,15 @@ def _declared(subject: Path) -> Model:
     """Read the description of a file, or of a model of the project, which need not be built."""
     from rparm.fmi.fmu_file import describe, read_model  # takes long
 
-    variables = subject / "variables.toml"
+    file = subject / f"{subject.name}{EQUATIONS}"
     try:
         return read_model(project.fmu_of(subject))
     except UserError:
-        if not variables.is_file():
+        if not file.is_file():
             raise
     with temporary_folder() as folder:
         program = [sys.executable, project.model_builder().with_name("generate.py")]
-        subprocess.run([*program, variables, "--output", folder], check=True, capture_output=True)
+        subprocess.run([*program, file, "--output", folder], check=True, capture_output=True)
         with ZipFile(folder / "described.fmu", "w") as archive:
             archive.write(folder / "modelDescription.xml", "modelDescription.xml")
         return describe(folder / "described.fmu").model

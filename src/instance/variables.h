@@ -1,5 +1,6 @@
-/* Table of variables that fmu/generate.py makes from variables.toml, functions of its rows, and the
- * values that belong to the instance. Terms as in section 2.2.7 of the FMI 2.0 specification. */
+/* Table of variables that fmu/generate.py makes from the file of a model, functions of its rows,
+ * and the values that belong to the instance. Terms as in section 2.2.7 of the FMI 2.0
+ * specification. */
 #pragma once
 
 #include "model.h"
@@ -52,7 +53,7 @@ struct variable {
     double nominal; /* > 0 */
 };
 
-/* A model and its variables, as declared in variables.toml. */
+/* A model and its variables, as its file declares them. */
 struct model_description {
     const char *name; /* model name and identifier */
     const char *guid;
@@ -126,8 +127,8 @@ const char *variable_type_name(enum variable_type type);
 
 /* ---- Values of the instance ----------------------------------------------------------------- */
 
-/* Values of the variables with owner = "instance" (time_variable.toml, solver_variables.toml).
- */
+/* Values of the variables that models have without declaring them: the time, and those of
+ * *_variables.toml, by their names. */
 struct instance_values {
     double time;                         /* s */
     int solver_steps;                    /* internal steps since initialization */

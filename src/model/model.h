@@ -211,7 +211,7 @@ struct model {
     struct range dx; /* double[], time derivatives of the states in their order; may overlap */
 
     /* Writes x' = f(t, x, u, p) to dx. A pure function: parameters are read from values, states and
-     * inputs only from x and u. t in s, the rest in the units of variables.toml. */
+     * inputs only from x and u. t in s, the rest in the units of its variables. */
     enum status (*right_hand_side)(const void *values, double t, const double x[], const double u[],
                                    double dx[]);
 

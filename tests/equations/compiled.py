@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,13 +13,13 @@ from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
 import building  # noqa: E402
+from compiler.interface import Declaration  # noqa: E402
 from compiler.read.model_file import ModelFile, ModelFileError, read  # noqa: E402
 from compiler.write import c_model, declaration, lock  # noqa: E402
-from equations_to_c import toml, value_of_toml  # noqa: E402
 
 __all__ = [
     "Model", "ModelFileError", "building", "c_model", "declaration", "declared", "lock", "read",
-    "read_text", "toml", "value_of_toml",
+    "read_text",
 ]  # fmt: skip
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
@@ -57,7 +56,7 @@ def read_text(folder: Path, text: str) -> ModelFile:
     """What a file with this text says."""
     path = folder / "model.toml"
     path.write_text(text, encoding="utf-8")
-    return read(path, declaration.solver_names())
+    return read(path)
 
 
 class Model:
@@ -153,7 +152,7 @@ class Model:
         return rows[: len(states), : last + 1]
 
 
-def declared(file: ModelFile) -> dict[str, Any]:
+def declared(file: ModelFile) -> Declaration:
     """The declaration of a file without a lock file."""
     references = lock.references(Path("no-such-file"), declaration.keys(file))
     return declaration.declared(file, references)

@@ -49,7 +49,7 @@ def runtime(level: str) -> building.Runtime:
 
 def quick(path: Path, output: Path, level: str = "-O1") -> Path:
     """The FMU of FMI 2.0, and in fmi3 the one of 3.0: only what a run needs, with the same bits."""
-    file = read(path, declaration.solver_names())
+    file = read(path)
     references = lock.references(lock.path_of(path), declaration.keys(file))
     made, versions = runtime(level), {"fmi2": output, "fmi3": output / "fmi3"}
     describe = {"fmi2": building.fmi2_description, "fmi3": fmi3_description}

@@ -21,7 +21,7 @@ from rparm.systems import loop_file
 from tests.campaign.test_campaign_file import MISTAKES as OF_CAMPAIGNS
 from tests.campaign.test_campaign_file import wrong
 from tests.closed_loop.test_loop_file import TABLES as OF_LOOPS
-from tests.equations.compiled import ModelFileError, read_text, value_of_toml
+from tests.equations.compiled import ModelFileError, read_text
 from tests.equations.examples import MODELS
 from tests.equations.test_model_file import EXAMPLES, MISTAKES
 from tests.rparm.test_scenario import WRONG as OF_SCENARIOS
@@ -105,6 +105,16 @@ def places(value: object) -> Iterator[tuple[str | int, ...]]:
     for key, inner in enumerate(value) if isinstance(value, list) else pairs:
         yield (key,)
         yield from ((key, *rest) for rest in places(inner))
+
+
+def value_of_toml(value: object) -> str:
+    """A value of TOML: JSON's texts, lists and numbers are the same, but for one character."""
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, dict):
+        pairs = (f"{value_of_toml(key)} = {value_of_toml(entry)}" for key, entry in value.items())
+        return f"{{ {', '.join(pairs)} }}"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def test_what_the_reader_takes_is_valid(tmp_path: Path) -> None:

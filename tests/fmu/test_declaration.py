@@ -1,115 +1,141 @@
-"""A mistake in a variables.toml is named in one line: file, place and reason."""
+"""A declaration of C by hand: a mistake is named in one line; what C and importers get of it."""
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.support.generator import VARIABLES, change, copied, generate, generated
+from tests.support.generator import ARM, WHEEL, change, generate, generated, scalars, wheel_in
 from tests.support.paths import ROOT
+from tests.support.programs import run
 from tests.support.tables import tables
 
-sys.path.insert(0, str(ROOT / "fmu"))
-from declaration.load import DeclarationError, load  # noqa: E402
-from fmi2.model_description import model_description  # noqa: E402
-from program import Provenance  # noqa: E402
-
-INDICATORS = 'event_indicators = ["to_stop", "push"]'
-MODELS = {  # by table of mistakes
-    "variables": "rp_manipulator",
-    "terminals": "rp_manipulator",
-    "enumerations": "rp_trajectory",
-    "discrete_variables": "wheel",
-}
-MISTAKES = tables(str(Path(__file__).with_name("mistakes")))
-CASES = [(part, *row) for part in MODELS for row in MISTAKES[part]["rows"]]
-CASES.append(("variables", "start = 2.0", "start = 1" + "0" * 400, "m1", "start = 1000", "number"))
-
-
-def complaint(path: Path) -> str:
-    """What is said of a wrong file: one line that begins with a file."""
-    with pytest.raises(DeclarationError) as caught:
-        model_description(load(path), Provenance())
-    text = str(caught.value)
-    assert re.match(r"[^\n]+\.toml: [^\n]+$", text)
-    return text
-
-
-@pytest.mark.parametrize("case", CASES, ids=lambda case: " ".join(case[3:])[:60])
-def test_a_mistake_is_named(tmp_path: Path, case: tuple[str, ...]) -> None:
-    part, old, new, *words = case
-    model = MODELS[part]
-    below = {"wheel": "tests", "rp_trajectory": "tests/fmu"}.get(model, "models")
-    variables = copied(model, tmp_path, below=below)
-    change(variables, old, new)
-    text = complaint(variables)
-    assert [word for word in words if word not in text] == []
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    assert complaint(tmp_path / "none.toml").endswith(
-        "none.toml: cannot be read: No such file or directory"
-    )
-
-
-def test_a_file_that_is_no_text_is_named(tmp_path: Path) -> None:
-    (tmp_path / "variables.toml").write_bytes(b"\xff\xfe")
-    assert "is not valid TOML" in complaint(tmp_path / "variables.toml")
-
-
-def test_the_command_line_writes_nothing_for_a_wrong_file(tmp_path: Path) -> None:
-    variables = copied("rp_manipulator", tmp_path)
-    change(variables, 'field = "parameters.m1"\n', "")
-    result = generate(variables, tmp_path / "out")
-    assert result.returncode == 2
-    assert result.stderr == f"generate.py: {variables}: variable m1: field is missing\n"
-    assert not (tmp_path / "out").exists()
-
-
-# ---- Booleans and event indicators ---------------------------------------------------------------
+INDICATORS = 'indicators = ["to_stop", "push"]'
+MISTAKES = tables(str(Path(__file__).with_name("mistakes")))["declaration"]["rows"]
 
 
 @pytest.fixture
 def wheel(tmp_path: Path) -> Path:
-    """variables.toml of a copy of the wheel."""
-    return copied("wheel", tmp_path, below="tests")
+    """The file of a copy of the wheel."""
+    return wheel_in(tmp_path / "wheel")
 
 
-def guid(variables: Path, output: Path) -> str:
-    return str(generated(variables, output).get("guid"))
+@pytest.mark.parametrize("case", MISTAKES, ids=lambda case: " ".join(case[2:])[:60])
+def test_a_mistake_is_named(wheel: Path, tmp_path: Path, case: list[str]) -> None:
+    old, new, *words = case
+    change(wheel, old, new)
+    result = generate(wheel, tmp_path / "out")
+    assert result.returncode == 2
+    assert re.match(r"generate.py: [^\n]+\.toml: [^\n]+\n$", result.stderr)
+    assert [word for word in words if word not in result.stderr] == []
+    assert not (tmp_path / "out").exists()
 
 
-def test_indicators_and_reinit_belong_to_the_guid(wheel: Path, tmp_path: Path) -> None:
-    guids = [guid(wheel, tmp_path / "as_it_is")]
-    change(wheel, INDICATORS, 'event_indicators = ["push", "to_stop"]')
-    guids.append(guid(wheel, tmp_path / "other_order"))
-    change(wheel, "reinit = true\n", "")
-    guids.append(guid(wheel, tmp_path / "no_reinit"))
-    assert len(set(guids)) == 3
-    change(wheel, 'parameters = ["stop"]', 'reinit = false\nparameters = ["stop"]')
-    assert guid(wheel, tmp_path / "default") == guids[-1]
-    change(wheel, 'event_indicators = ["push", "to_stop"]', "event_indicators = []")
-    none = guid(wheel, tmp_path / "none")
-    change(wheel, "event_indicators = []\n", "")
-    assert guid(wheel, tmp_path / "default") == none != guids[-1]
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    result = generate(tmp_path / "wheel.toml", tmp_path / "out")
+    assert result.stderr.endswith("wheel.toml: cannot be read: No such file or directory\n")
 
 
-def test_a_model_without_events_has_no_trace_of_them(tmp_path: Path) -> None:
-    assert generated(VARIABLES, tmp_path).get("numberOfEventIndicators") == "0"
-    files = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert len(files) == 5
-    for path in files:
-        text = path.read_text()
-        assert "reinit" not in text and "indicator" not in text.lower().replace(
-            "numberofeventindicators", ""
-        )
+# ---- What C gets ---------------------------------------------------------------------------------
 
 
-def test_the_table_binds_booleans_and_indicators(tmp_path: Path) -> None:
-    generated(ROOT / "tests" / "wheel" / "variables.toml", tmp_path)
+def test_a_variable_needs_only_its_declaration(wheel: Path, tmp_path: Path) -> None:
+    change(wheel, "[where]\n", '[where]\nlost = { unit = "N", description = "Of the speed" }\n')
+    change(wheel.with_suffix(".lock.toml"), "[local]\n", "[local]\nlost = 70\n")
+    change(wheel.with_suffix(".h"), "double push;", "double push, lost;")
+    root = generated(wheel, tmp_path)
+    assert scalars(root)["lost"].get("valueReference") == "70"
+    table = (tmp_path / "variables.c").read_text()
+    assert '{70, "lost", VARIABLE_FLOAT64, VARIABLE_OF_MODEL' in table
+    assert compiled(wheel, tmp_path) == ""
+
+
+def compiled(wheel: Path, folder: Path) -> str:
+    """What the compiler says of the generated variables.c."""
+    sources = [ROOT / "src" / part for part in ("model", "integrator", "instance")]
+    includes = [f"-I{path}" for path in (wheel.parent, *sources, ROOT / "fmu" / "fmi")]
+    return run("cc", "-std=c17", "-fsyntax-only", *includes, folder / "variables.c").stderr
+
+
+@pytest.mark.parametrize(
+    ("field", "words"),
+    [("double loss", "lost_speed"), ("int lost_speed", "lost_speed must be of type double")],
+)
+def test_a_wrong_field_does_not_compile(
+    wheel: Path, tmp_path: Path, field: str, words: str
+) -> None:
+    change(wheel.with_suffix(".h"), "double lost_speed", field)
+    generated(wheel, tmp_path)
+    assert words in compiled(wheel, tmp_path)
+
+
+def test_the_table_binds_booleans_indicators_and_methods(tmp_path: Path) -> None:
+    generated(WHEEL, tmp_path)
     table = (tmp_path / "variables.c").read_text()
     row = re.search(r'\{21, "is_counting", VARIABLE_BOOLEAN, [^}]+\}', table)
     assert row is not None and row[0].split("\n")[-1] == "     1.0, 0.0, 1.0, 1.0}"
     assert "is_counting must be of type int" in table
     assert "static const unsigned indicators[] = {50, 51};" in table
+    assert "_Static_assert(INTEGRATOR_ERK == 3" in table
+
+
+# ---- What importers get --------------------------------------------------------------------------
+
+
+def guid(file: Path, output: Path) -> str:
+    return str(generated(file, output).get("guid"))
+
+
+def test_the_guid_follows_the_interface_and_not_the_texts(wheel: Path, tmp_path: Path) -> None:
+    original, guids = wheel.read_text(), {}
+    for name, old, new in (
+        ("same", "", ""),
+        ("text", "Whole turns", "Turns"),
+        ("terminals", "[parameters]", TERMINALS),
+        ("start", "start = 0.0", "start = 0.5"),
+        ("unit", 'unit = "rad"', 'unit = "m"'),
+        ("order of indicators", INDICATORS, 'indicators = ["push", "to_stop"]'),
+        ("what it follows from", '["angle", "stop"]', '["angle"]'),
+        ("type", 'is_turning = { type = "Boolean"', 'is_turning = { type = "Integer"'),
+        ("items", 'is_turning = { type = "Boolean"', 'is_turning = { type = ["no", "yes"]'),
+        ("other items", 'is_turning = { type = "Boolean"', 'is_turning = { type = ["n", "y"]'),
+    ):
+        wheel.write_text(original.replace(old, new, 1))
+        guids[name] = guid(wheel, tmp_path / name)
+    assert guids["text"] == guids["terminals"] == guids["same"]
+    assert len(set(guids.values())) == len(guids) - 2
+    assert re.fullmatch(r"\{[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", guids["same"])
+
+
+TERMINALS = """[terminals.axle]
+rule = "plug"
+description = ""
+signals = { angle = "angle" }
+[parameters]"""
+
+
+def test_a_value_reference_belongs_to_the_guid(wheel: Path, tmp_path: Path) -> None:
+    before = guid(wheel, tmp_path)
+    change(wheel.with_suffix(".lock.toml"), "push = 51", "push = 52")
+    assert guid(wheel, tmp_path) != before
+
+
+def test_items_belong_to_the_guid_and_their_texts_do_not(wheel: Path, tmp_path: Path) -> None:
+    change(
+        wheel, 'is_turning = { type = "Boolean"', 'is_turning = { type = { n = "No", y = "Yes" }'
+    )
+    before = guid(wheel, tmp_path)
+    change(wheel, '"Yes"', '"Turning"')
+    assert guid(wheel, tmp_path) == before
+
+
+def test_a_model_without_events_has_no_trace_of_them(tmp_path: Path) -> None:
+    assert generated(ARM, tmp_path).get("numberOfEventIndicators") == "0"
+    files = [path for path in tmp_path.rglob("*") if path.suffix in (".xml", ".h", ".c")]
+    for path in files:
+        if path.name.startswith("equations"):
+            continue
+        text = path.read_text()
+        assert "reinit" not in text and "indicator" not in text.lower().replace(
+            "numberofeventindicators", ""
+        )

@@ -14,6 +14,7 @@ import pytest
 from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
+from tests.support.generator import ARM, generated
 from tests.support.tables import tables
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,10 +37,9 @@ def run_document(
 
 @pytest.fixture(scope="module")
 def model_description(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """modelDescription.xml, made from the model's variables.toml."""
+    """modelDescription.xml, made from the model's file."""
     output = tmp_path_factory.mktemp("generated")
-    command = [sys.executable, ROOT / "fmu" / "generate.py", MODEL / "variables.toml"]
-    subprocess.run([*command, "--output", output], check=True)
+    generated(ARM, output)
     return output / "modelDescription.xml"
 
 
@@ -108,9 +108,8 @@ def test_every_variable_is_listed_as_declared(
             assert row[key.capitalize()] == kind.get(key, "").replace("e-0", "e-")
 
 
-def test_parameter_table_is_variables_toml(page: lxml.html.HtmlElement) -> None:
-    declared = tomllib.loads((MODEL / "variables.toml").read_text(encoding="utf-8"))["variables"]
-    parameters = {n: v for n, v in declared.items() if v["causality"] == "parameter"}
+def test_parameter_table_is_that_of_the_file(page: lxml.html.HtmlElement) -> None:
+    parameters = tomllib.loads((MODEL / "arm.toml").read_text(encoding="utf-8"))["parameters"]
     rows = table_after(page, "Parameters")
     assert [row["Parameter"] for row in rows] == list(parameters)
     for row in rows:

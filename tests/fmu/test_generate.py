@@ -1,8 +1,6 @@
 """The generator: what it writes, and that a variable is declared in one place."""
 
 import os
-import re
-import subprocess
 import xml.etree.ElementTree as ET
 import zipfile
 from datetime import datetime
@@ -12,17 +10,8 @@ import fmpy
 import pytest
 from lxml import etree
 
-from tests.support.generator import (
-    VARIABLES,
-    change,
-    copied,
-    generate,
-    generated,
-    scalars,
-    unknowns,
-)
+from tests.support.generator import ARM, WHEEL, generate, generated, scalars, unknowns
 from tests.support.paths import NAMES, ROOT
-from tests.support.rparm_project import BUILD
 from tests.support.tables import tables
 
 TABLES = tables(str(Path(__file__).with_name("mistakes")))["generate"]
@@ -31,19 +20,7 @@ TABLES = tables(str(Path(__file__).with_name("mistakes")))["generate"]
 @pytest.fixture(scope="module")
 def description(tmp_path_factory: pytest.TempPathFactory) -> ET.Element:
     """Model description of the manipulator."""
-    return generated(VARIABLES, tmp_path_factory.mktemp("generated"))
-
-
-@pytest.fixture
-def model_copy(tmp_path: Path) -> Path:
-    """variables.toml of a copy of the manipulator."""
-    return copied("rp_manipulator", tmp_path)
-
-
-@pytest.fixture
-def trajectory(tmp_path: Path) -> Path:
-    """variables.toml of a copy of the reference motions, which have two enumerations."""
-    return copied("rp_trajectory", tmp_path, below="tests/fmu")
+    return generated(ARM, tmp_path_factory.mktemp("generated"))
 
 
 def test_the_published_interface_stays(description: ET.Element) -> None:
@@ -103,9 +80,9 @@ def test_units_are_defined_and_angles_have_degrees(description: ET.Element) -> N
 
 
 def test_where_the_fmu_comes_from(tmp_path: Path) -> None:
-    root = generated(VARIABLES, tmp_path, "--version", "1.2.3", "--license", ROOT / "LICENSE")
+    root = generated(WHEEL, tmp_path, "--version", "1.2.3", "--license", ROOT / "LICENSE")
     assert root.get("version") == "1.2.3"
-    assert root.get("generationTool") == "RPManipulator 1.2.3"
+    assert root.get("generationTool") == "Wheel 1.2.3"
     assert root.get("license") == "BSD-3-Clause"
     notice = root.get("copyright", "")
     assert notice in (ROOT / "LICENSE").read_text().splitlines()
@@ -114,7 +91,7 @@ def test_where_the_fmu_comes_from(tmp_path: Path) -> None:
 
 
 def test_the_date_is_that_of_the_sources(tmp_path: Path) -> None:
-    dated = generated(VARIABLES, tmp_path, SOURCE_DATE_EPOCH="1700000000")
+    dated = generated(WHEEL, tmp_path, SOURCE_DATE_EPOCH="1700000000")
     assert dated.get("generationDateAndTime") == "2023-11-14T22:13:20+00:00"
     schema = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
     etree.XMLSchema(file=schema).assertValid(etree.parse(tmp_path / "modelDescription.xml"))
@@ -130,7 +107,7 @@ def test_a_wrong_origin_is_named(
     if license_text is not None:
         (tmp_path / "LICENSE").write_text(license_text)
     options = ("--license", tmp_path / "LICENSE")
-    result = generate(VARIABLES, tmp_path / "out", *options, SOURCE_DATE_EPOCH=epoch)
+    result = generate(WHEEL, tmp_path / "out", *options, SOURCE_DATE_EPOCH=epoch)
     assert result.returncode == 2
     assert result.stderr.startswith("generate.py: ") and result.stderr.count("\n") == 1
     assert message in result.stderr
@@ -142,102 +119,17 @@ def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> No
     date = root.get("generationDateAndTime")
     epoch = str(int(datetime.fromisoformat(date).timestamp())) if date else ""
     options = ("--version", root.get("version", ""), "--license", ROOT / "LICENSE")
-    variables = built / "model" / "variables.toml"
-    generated(variables, tmp_path, *options, SOURCE_DATE_EPOCH=epoch)
-    descriptions = ("modelDescription.xml", "fmi3/modelDescription.xml")
-    for name in (*descriptions, "terminalsAndIcons.xml", "variables.c", "value_references.h"):
+    options += ("--icon", ARM.with_name("model.png"))
+    generated(ARM, tmp_path, *options, SOURCE_DATE_EPOCH=epoch)
+    names = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()}
+    assert len(names) == 8
+    for name in names:
         assert (built / name).read_text() == (tmp_path / name).read_text()
-
-
-@pytest.fixture
-def wheel(tmp_path: Path) -> Path:
-    """variables.toml of a copy of the wheel."""
-    return copied("wheel", tmp_path, below="tests")
-
-
-def test_a_variable_needs_only_its_declaration(wheel: Path, tmp_path: Path) -> None:
-    wheel.write_text(
-        wheel.read_text()
-        + '[variables.lever]\nreference = 70\nfield = "push"\ncausality = "local"\n'
-        'variability = "continuous"\nunit = "N"\ndescription = "Push of the speed"\n'
-    )
-    root = generated(wheel, tmp_path / "out")
-    assert scalars(root)["lever"].get("valueReference") == "70"
-    table = (tmp_path / "out" / "variables.c").read_text()
-    assert '{70, "lever", VARIABLE_FLOAT64, VARIABLE_OF_MODEL' in table
-    compile_table(tmp_path / "out", "tests/wheel")
-
-
-def compile_table(folder: Path, model: str) -> None:
-    """Compile the generated variables.c; raise with the compiler's words where that fails."""
-    includes = [
-        f"-I{ROOT / name}"
-        for name in (
-            "src/model",
-            "src/integrator",
-            "src/instance",
-            "fmu/fmi",
-            "models",
-            "models/rp_manipulator",
-            "models/rp_plant/equations",
-            model,
-        )
-    ]
-    includes.append(f"-I{BUILD / 'models' / 'rp_manipulator'}")  # arm_values.h
-    command = ["cc", "-std=c17", "-fsyntax-only", *includes, folder / "variables.c"]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    if result.returncode != 0:
-        raise ValueError(result.stderr)
-
-
-@pytest.mark.parametrize("field", ["no_such_field", "is_turning"])
-def test_a_wrong_field_does_not_compile(wheel: Path, tmp_path: Path, field: str) -> None:
-    change(wheel, 'field = "lost_speed"', f'field = "{field}"')
-    generated(wheel, tmp_path / "out")
-    with pytest.raises(ValueError, match=field):
-        compile_table(tmp_path / "out", "tests/wheel")
-
-
-def test_the_guid_follows_the_interface_and_not_the_texts(model_copy: Path, tmp_path: Path) -> None:
-    original = model_copy.read_text()
-    guids = {}
-    for name, old, new in (
-        ("same", "", ""),
-        ("text", "Mass of link 1", "The mass of link 1"),
-        ("start", "start = 2.0", "start = 2.5"),
-        ("unit", 'unit = "kg"', 'unit = "m"'),
-        ("reference", "reference = 65", "reference = 66"),
-    ):
-        model_copy.write_text(original.replace(old, new, 1))
-        guids[name] = generated(model_copy, tmp_path / name).get("guid")
-    assert guids["text"] == guids["same"]
-    assert len(set(guids.values())) == 4
-    assert re.fullmatch(r"\{[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", guids["same"])
-
-
-def test_items_belong_to_the_guid_and_their_texts_do_not(trajectory: Path, tmp_path: Path) -> None:
-    guids = [generated(trajectory, tmp_path / "same").get("guid")]
-    change(trajectory, "The end effector moves along a circle", "Round and round")
-    guids.append(generated(trajectory, tmp_path / "text").get("guid"))
-    change(trajectory, "line = {", "straight = {")
-    guids.append(generated(trajectory, tmp_path / "item").get("guid"))
-    assert guids[0] == guids[1] != guids[2]
-
-
-@pytest.mark.parametrize(("old", "new", "word"), TABLES["constants"])
-def test_a_constant_of_another_value_does_not_compile(
-    tmp_path: Path, old: str, new: str, word: str
-) -> None:
-    plant = copied("rp_plant", tmp_path)
-    change(plant, old, new)
-    generated(plant, tmp_path / "out")
-    with pytest.raises(ValueError, match=re.escape(word)):
-        compile_table(tmp_path / "out", "models/rp_plant")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
-    result = generate(VARIABLES, tmp_path / "out")
+    result = generate(WHEEL, tmp_path / "out")
     assert result.returncode == 2
     assert str(tmp_path) in result.stderr

@@ -200,12 +200,9 @@ def test_fmpy_finds_no_problem(fmu: Path, name: str) -> None:
 @pytest.mark.parametrize("folder", FOLDERS.values())
 def test_the_page_of_a_model_names_the_variables_that_it_declares(folder: str) -> None:
     model = ROOT / "models" / folder
-    path, sections = model / "variables.toml", ["variables"]
-    if not path.exists():  # its equations declare them
-        path, sections = model / f"{folder}.toml", ["parameters", "inputs", "states", "outputs"]
-    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    content = tomllib.loads((model / f"{folder}.toml").read_text(encoding="utf-8"))
     page = (model / "README.md").read_text(encoding="utf-8")
-    for section in sections:
+    for section in ("parameters", "inputs", "states", "outputs"):
         assert content.get(section, {}).keys() <= set(re.findall(r"`(\w+)`", page))
 
 

@@ -171,24 +171,23 @@ def test_an_fmu_can_be_checked_by_what_it_carries(folder: Path, scenario: str) -
 # ---- what cannot be carried ----------------------------------------------------------------------
 
 
-def collect(variables: Path, output: Path, *names: str) -> subprocess.CompletedProcess[str]:
-    """Collect the scenarios of a model as the build does."""
+def collect(model: Path, output: Path, *names: str) -> subprocess.CompletedProcess[str]:
+    """Collect the scenarios of a copy of the controller as the build does."""
     program = ROOT / "fmu" / "references.py"
-    return run(sys.executable, program, variables, *names, "--output", output)
+    description = BUILD / "fmu" / "RPController" / "modelDescription.xml"
+    return run(sys.executable, program, description, *names, "--folder", model, "--output", output)
 
 
 @pytest.fixture
 def controller(tmp_path: Path) -> Path:
-    """variables.toml of a copy of the controller, with one scenario and its reference."""
-    made = BUILD / "fmu" / "RPController" / "model" / "variables.toml"
-    variables = Path(shutil.copy(made, tmp_path))
+    """A copy of the controller's folder, with one scenario and its reference."""
     model = ROOT / "models" / "rp_controller"
     scenario = Path("scenarios") / "controller_pd_gravity.toml"
     reference = Path("references") / "controller_pd_gravity"
-    (variables.parent / "scenarios").mkdir()
-    shutil.copy(model / scenario, variables.parent / scenario)
-    shutil.copytree(model / reference, variables.parent / reference)
-    return variables
+    (tmp_path / "scenarios").mkdir()
+    shutil.copy(model / scenario, tmp_path / scenario)
+    shutil.copytree(model / reference, tmp_path / reference)
+    return tmp_path
 
 
 def test_a_copy_is_collected(controller: Path, tmp_path: Path) -> None:
@@ -203,7 +202,7 @@ def test_a_copy_is_collected(controller: Path, tmp_path: Path) -> None:
 def test_a_wrong_scenario_is_named(
     controller: Path, tmp_path: Path, old: str, new: str, words: str
 ) -> None:
-    scenario = controller.parent / "scenarios" / "controller_pd_gravity.toml"
+    scenario = controller / "scenarios" / "controller_pd_gravity.toml"
     change(scenario, old, new)
     result = collect(controller, tmp_path / "out", "controller_pd_gravity")
     assert result.returncode == 2
@@ -214,10 +213,10 @@ def test_a_wrong_scenario_is_named(
 
 @pytest.mark.parametrize("missing", ["scenarios", "references"])
 def test_what_is_missing_is_named(controller: Path, tmp_path: Path, missing: str) -> None:
-    shutil.rmtree(controller.parent / missing)
+    shutil.rmtree(controller / missing)
     result = collect(controller, tmp_path / "out", "controller_pd_gravity")
     assert result.returncode == 2
-    assert result.stderr.startswith(f"references.py: {controller.parent / missing}")
+    assert result.stderr.startswith(f"references.py: {controller / missing}")
     assert result.stderr.endswith(": cannot be read: No such file or directory\n")
     assert result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()

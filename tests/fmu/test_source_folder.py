@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.generator import VARIABLES, generate
+from tests.support.generator import WHEEL, generate
 from tests.support.paths import ROOT
 from tests.support.programs import run
 
@@ -238,7 +238,7 @@ def test_what_was_written_before_stays_after_a_mistake(toy: Toy) -> None:
 
 
 def test_a_description_of_no_files_is_refused(tmp_path: Path) -> None:
-    result = generate(VARIABLES, tmp_path / "out", "--sources", tmp_path)
+    result = generate(WHEEL, tmp_path / "out", "--sources", tmp_path)
     assert result.returncode == 2
     assert result.stderr == f"generate.py: {tmp_path}: has no C files\n"
     assert not (tmp_path / "out" / "modelDescription.xml").exists()

@@ -23,9 +23,11 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "fmu")]
 
-from declaration.c_tables import value_references, variable_table  # noqa: E402
-from declaration.load import DeclarationError  # noqa: E402
-from declaration.load import load as load_declaration  # noqa: E402
+from compiler.read import by_hand  # noqa: E402
+from compiler.read.content import ModelFileError  # noqa: E402
+from compiler.write import lock  # noqa: E402
+from compiler.write.c_tables import value_references, variable_table  # noqa: E402
+from compiler.write.declaration import declared, keys  # noqa: E402
 from fmi2.model_description import model_description  # noqa: E402
 from fmi3.model_description import model_description as fmi3_model_description  # noqa: E402
 from fmi3.model_description import terminals_and_icons  # noqa: E402
@@ -180,7 +182,8 @@ class Fuzz:
         self.findings: dict[str, str] = {}
         self.model = folder / "models" / MODEL
         shutil.copytree(ROOT / "models" / MODEL, self.model, ignore=shutil.ignore_patterns("*.png"))
-        shutil.copytree(ROOT / "src", folder / "src", ignore=shutil.ignore_patterns("*.[ch]"))
+        for name in ("wheel.toml", "wheel.lock.toml"):
+            shutil.copy(ROOT / "tests" / "wheel" / name, folder)
         self.scenario = self.model / "scenarios" / f"{SCENARIO}.toml"
         self.log = self.scenario.with_name("log.csv")
         rows = "".join(f"{i},{i / 10},{i % 7}\n" for i in range(100))
@@ -224,16 +227,14 @@ class Fuzz:
         self.scenario.write_bytes(kept)
 
     def a_declaration(self) -> None:
-        files = [
-            self.model / "variables.toml",
-            *sorted((self.folder / "src" / "instance").glob("*.toml")),
-        ]
-        file = self.chance.choice(files)
+        file = self.chance.choice(sorted(self.folder.glob("wheel*.toml")))
         content = self.either_way(file.read_text(encoding="utf-8"))
         self.with_file(file, content, self.generate)
 
     def generate(self) -> None:
-        declaration = load_declaration(self.model / "variables.toml")
+        file = by_hand.read(self.folder / "wheel.toml")
+        references = lock.references(self.folder / "wheel.lock.toml", keys(file))
+        declaration = declared(file, references)
         model_description(declaration, Provenance("1"))
         fmi3_model_description(declaration, Provenance("1"))
         terminals_and_icons(declaration)
@@ -300,7 +301,7 @@ class Fuzz:
         error = raised_by(check)
         taken = time.process_time() - begin
         found = None
-        if isinstance(error, UserError | DeclarationError):
+        if isinstance(error, UserError | ModelFileError):
             self.refused += 1
             text = str(error)
             if not text or "\n" in text or re.search(r"\w' object|^'|: '\w+'$", text):

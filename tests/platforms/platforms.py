@@ -103,7 +103,7 @@ def newest_source() -> float:
         path.stat().st_mtime
         for folder in ("src", "fmu", "models")
         for path in (ROOT / folder).rglob("*")
-        if path.suffix in {".c", ".h"} or path.name == "variables.toml"
+        if path.suffix in {".c", ".h"} or path.name == f"{path.parent.name}.toml"
     )
 
 

@@ -131,7 +131,7 @@ def test_what_builds_an_fmu_leaves_nothing_broken(tmp_path: Path, program: str) 
     output = tmp_path / "out"
     output.mkdir()
     file, arguments = {
-        "generate": ("modelDescription.xml", [model / "variables.toml", "--output", output]),
+        "generate": ("modelDescription.xml", [model / "rp_manipulator.toml", "--output", output]),
         "package": ("a.fmu", [output / "a.fmu", f"model={model}"]),
         "document": (
             "index.html",

@@ -179,7 +179,6 @@ def test_run_of_all_measures_the_order(
     monkeypatch.setattr(convergence, "study", known)
     build, report = project / "build", project / "report"
     (build / "fmi3").mkdir(parents=True)
-    shutil.copy(MODEL / "variables.toml", project / "models" / MODEL.name)
     shutil.copy(fmu, build)
     if "3" in versions:
         shutil.copy(updated.path, build / "fmi3")

@@ -1,4 +1,4 @@
-"""Runs the generator as the build does, on the declarations of the models and on changed copies."""
+"""Runs the generator as the build does, on files of models and on changed copies."""
 
 import os
 import shutil
@@ -9,14 +9,16 @@ from pathlib import Path
 
 from tests.support.paths import ROOT
 
-VARIABLES = ROOT / "models" / "rp_manipulator" / "variables.toml"
+ARM = ROOT / "models" / "rp_manipulator" / "rp_manipulator.toml"
+WHEEL = ROOT / "tests" / "wheel" / "wheel.toml"  # by hand
 
 
 def generate(
-    variables: Path, output: Path, *options: str | Path, **environment: str
+    file: Path, output: Path, *options: str | Path, **environment: str
 ) -> subprocess.CompletedProcess[str]:
     """Run the generator as the build does."""
-    command = [sys.executable, ROOT / "fmu" / "generate.py", variables, "--output", output]
+    command = [sys.executable, ROOT / "fmu" / "generate.py", file, "--output", output]
+    command += ["--by-hand"] if file.name == WHEEL.name else []
     command += options
     kept = {key: value for key, value in os.environ.items() if key != "SOURCE_DATE_EPOCH"}
     return subprocess.run(
@@ -24,28 +26,19 @@ def generate(
     )
 
 
-def generated(
-    variables: Path, output: Path, *options: str | Path, **environment: str
-) -> ET.Element:
+def generated(file: Path, output: Path, *options: str | Path, **environment: str) -> ET.Element:
     """Run the generator and parse the model description."""
-    result = generate(variables, output, *options, **environment)
+    result = generate(file, output, *options, **environment)
     assert result.returncode == 0, result.stderr
     return ET.parse(output / "modelDescription.xml").getroot()
 
 
-def copied(model: str, to: Path, below: str = "models") -> Path:
-    """Copy what the generator reads for a model, to be changed; the path of its variables.toml."""
-    (to / "src" / "instance").mkdir(parents=True)
-    for shared in (ROOT / "src" / "instance").glob("*.toml"):
-        shutil.copy(shared, to / "src" / "instance")
-    for declaration in (
-        *ROOT.glob("models/*/variables.toml"),
-        ROOT / below / model / "variables.toml",
-    ):
-        copy = to / declaration.relative_to(ROOT)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(declaration, copy)
-    return to / below / model / "variables.toml"
+def wheel_in(folder: Path) -> Path:
+    """Copy what the generator reads for the wheel, to be changed; the path of its file."""
+    folder.mkdir(exist_ok=True)
+    for suffix in (".lock.toml", ".h"):
+        shutil.copy(WHEEL.with_suffix(suffix), folder)
+    return Path(shutil.copy(WHEEL, folder))
 
 
 def change(path: Path, old: str, new: str) -> None:

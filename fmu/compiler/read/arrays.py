@@ -3,12 +3,10 @@
 from collections.abc import Iterator, Mapping
 from itertools import groupby
 
-from declaration.load import shown
-
 from ..expressions.expression import ExpressionError, Node
 from ..expressions.indexes import at_indexes
 from ..expressions.parser import parse, parse_ranges
-from .content import Element, ModelFile, ModelFileError, placed
+from .content import Element, ModelFile, ModelFileError, placed, shown
 
 FOR = "for"
 MOST_ELEMENTS = 20_000

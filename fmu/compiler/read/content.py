@@ -10,14 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from declaration.load import shown
-from declaration.schema import Terminal
-
 from ..expressions.expression import ExpressionError, Node, in_order
 from ..expressions.indexes import at_indexes
 from ..expressions.kinds import CONDITION, NUMBER, Kind
 from ..expressions.parser import RANDOM_FUNCTIONS, Function, Lookup, parse
 from ..graph.tables import LookupTable
+from ..interface import Terminal
 from ..units import Unit, parsed
 from .code import CodeFile
 
@@ -34,6 +32,7 @@ BOOLEAN, INTEGER = "Boolean", "Integer"
 FIXED, DISCRETE = "fixed", "discrete"  # variabilities: of parameters, and of what follows
 MOST_NUMBERS = 16  # that a whole number may be, for conditions to be resolved
 MOST_OPERATIONS = 1_000_000  # of all expressions
+LONGEST_SHOWN = 60  # characters of a value in a message
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
     r"^(?:equations?|algebraic|residuals?|dae)$": (
@@ -92,6 +91,7 @@ class Variable:
     display: tuple[str, float, float] | None = None  # unit in the file, with factor and offset
     description: str = ""
     derivative_of: str = ""  # the state of which the FMU has it as the derivative
+    follows: tuple[str, ...] = ()  # what it follows from, if C by hand calculates it
     variability: str = ""  # "fixed" or "discrete" if the file says so
     causality: str = ""  # "local" of a state that is no output
     shown: bool = True  # the FMU has it as a variable
@@ -217,6 +217,9 @@ class ModelFile:
     events: list[Event] = field(default_factory=list)
     checks: list[tuple[str, Expression]] = field(default_factory=list)  # messages and conditions
     terminals: dict[str, Terminal] = field(default_factory=dict)
+    is_by_hand: bool = False  # it has no equations: by_hand.py
+    indicators: list[str] = field(default_factory=list)  # of C by hand
+    time_events: bool = False  # of C by hand
     order: list[Expression] = field(default_factory=list)  # each after those that it names
     graph: Any = None  # what a generator makes of it
     fields: Any = None  # where it keeps the values
@@ -263,6 +266,11 @@ class ModelFile:
         """The function of C that writes variables without a value; empty if there is none."""
         name = f"{self.path.stem}_calculate"
         return name if self.code and name in self.code.program.functions else ""
+
+    @property
+    def named_indicators(self) -> list[str]:
+        """Variables that are event indicators of C by hand."""
+        return self.hook.indicators if self.hook else self.indicators
 
     @property
     def has_units(self) -> bool:
@@ -344,6 +352,15 @@ def placed(*place: object) -> Iterator[None]:
         yield
     except (ModelFileError, ValueError) as error:
         raise ModelFileError(": ".join([*map(str, place), str(error)])) from None
+
+
+def shown(value: object) -> str:
+    """Write a value in short; an integer may have more digits than Python writes."""
+    try:
+        text = repr(value)
+    except ValueError:
+        return "a very large number"
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."
 
 
 def instead_of(text: str) -> str:

@@ -12,8 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from declaration.load import shown
-
 from ..expressions.dimensions import dimension_of, of_exponents
 from ..expressions.expression import CONSTANTS, ExpressionError, Node, in_order, with_names
 from ..expressions.kinds import CONDITION, NUMBER, WHOLE, with_kinds
@@ -39,10 +37,12 @@ from .content import (
     Sampler,
     Variable,
     placed,
+    shown,
 )
-from .include import Source, source_of
+from .include import Source, source_of, tables_of
 from .meaning import check
 
+INSTANCE = Path(__file__).resolve().parents[3] / "src" / "instance"
 MOST_VARIABLES = 20_000
 
 
@@ -51,16 +51,26 @@ def _named(name: str) -> str:
     return name if re.fullmatch(rf"{keys.NAME.pattern}(\[[^]]+\].*)?", name) else shown(name)
 
 
-def read_tables(source: Source, solver_names: Iterable[str]) -> ModelFile:
+def solver_names() -> set[str]:
+    """Return the names of the variables that models get without declaring them."""
+    tables = [tables_of(path)[1] for path in INSTANCE.glob("*_variables.toml")]
+    return {name for sections in tables for section in sections.values() for name in section}
+
+
+def read_tables(source: Source, reserved: Iterable[str], is_by_hand: bool = False) -> ModelFile:
     """Read the tables, without the meaning of the expressions."""
     path, text = source.path, source.text
-    head = keys.entries(source.tables, keys.HEAD, "name", "section")
+    known = keys.BY_HAND if is_by_hand else keys.HEAD
+    head = keys.entries(source.tables, known, "name", "section")
     if keys.DEVICE.fullmatch(head["name"]):
         raise ModelFileError("name: Windows keeps this name for a device, choose another one")
     with placed("[experiment]"):
         experiment = _experiment(keys.entries(head.get("experiment", {}), keys.EXPERIMENT))
-    reserved = keys.RESERVED | set(solver_names)
+    reserved = keys.RESERVED | set(reserved)
     file = ModelFile(head["name"], head.get("description", ""), experiment, path, text, reserved)
+    file.is_by_hand = is_by_hand
+    file.indicators = head.get("indicators", [])
+    file.time_events = head.get("time_events", False)
     for size, number in head.get("sizes", {}).items():
         with placed("[sizes]", _named(size)):
             _check_name(size, file)
@@ -114,7 +124,7 @@ def read_tables(source: Source, solver_names: Iterable[str]) -> ModelFile:
         _read_event(file, element)
     for message, condition in head.get("check", {}).items():
         _read_check(file, message, condition)
-    terminals.read(file, head.get("terminals", {}))
+    file.terminals = terminals.read(file, head.get("terminals", {}))
     _check_places(file)
     return file
 
@@ -292,11 +302,13 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
         _set_start(section, given, texts)
         variable = Variable(element.name, section, **given)
         wanted = DISCRETE if section in keys.CALCULATED else FIXED
-        if variable.variability not in ("", wanted):
+        if variable.variability not in ("", wanted, FIXED if file.is_by_hand else wanted):
             said = shown(variable.variability)
             raise ModelFileError(f'variability: expected "{wanted}", got {said}')
         _set_unit(variable, file)
         _check_range(variable)
+        if file.is_by_hand and texts:
+            raise ModelFileError(f"start: expected a number, got {shown(texts['start'])}")
     for key, text in texts.items():
         whole = (*place, key) if isinstance(element.entry, dict) else place
         options = (variable.kind, element.name, key == "derivative")
@@ -306,7 +318,7 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
             expression.event = "then"  # inputs jump at the start
         else:
             variable.expression = expression
-    if section in header.CALCULATED and not texts:
+    if section in header.CALCULATED and not texts and not file.is_by_hand:
         function = f"{file.calculate}: {element.name}"
         tree = Node("call", 1, name=function)
         variable.expression = Expression(place, function, tree, variable.kind, element.name)
@@ -318,11 +330,16 @@ def _keys(section: str, entry: object, file: ModelFile) -> tuple[tuple[str, ...]
     """Return the keys that an entry may have, and the one that it needs."""
     if section in header.CALCULATED and file.calculate:  # C may write it
         return keys.SECTIONS[section][0], ""
+    known, needed = keys.SECTIONS[section]
     if section == "parameters" and isinstance(entry, dict) and "value" in entry:
-        return keys.OWN_KEYS[FOLLOWS]
-    if section in keys.NOT_REAL and isinstance(entry, dict) and "type" in entry:
-        return keys.OWN_KEYS[keys.NOT_REAL[section]]
-    return keys.SECTIONS[section]
+        known, needed = keys.OWN_KEYS[FOLLOWS]
+    elif section in keys.NOT_REAL and isinstance(entry, dict) and "type" in entry:
+        known, needed = keys.OWN_KEYS[keys.NOT_REAL[section]]
+    if file.is_by_hand:
+        own = ("follows",) if section in header.CALCULATED else ()
+        known = (*(key for key in known if key not in keys.OF_EQUATIONS), *own)
+        needed = "follows" if section == "outputs" else needed if needed in known else ""
+    return known, needed
 
 
 def _section(section: str, given: dict[str, Any]) -> str:
@@ -537,12 +554,12 @@ def _hint(variable: Variable | None, is_mode: bool) -> str:
     return f", of {variable.place}: what keeps its value until an event is one of [discrete]"
 
 
-def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
-    """Read and check a file for a model that has `solver_names`, too; ModelFileError."""
+def read(path: Path) -> ModelFile:
+    """Read and check a file; ModelFileError."""
     with placed(path):
         source = source_of(path)
     with located(path, source.text):
-        file = read_tables(source, solver_names)
+        file = read_tables(source, solver_names())
         file.sources = [each.path for each in source.all()]
         check(file)
     return file

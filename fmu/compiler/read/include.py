@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from declaration.load import shown
-
-from .content import ModelFileError, placed
+from .content import (
+    ModelFileError,
+    placed,
+    shown,
+)
 
 LARGEST = 10**6  # bytes
 MOST_LEVELS = 20

@@ -7,8 +7,6 @@ import re
 from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
-from declaration.load import shown
-
 from ..expressions.expression import FUNCTIONS, finite_number
 from ..expressions.kinds import CONDITION, WHOLE, Kind
 from ..expressions.parser import FURTHER, NO_NAMES
@@ -23,6 +21,7 @@ from .content import (
     ModelFileError,
     instead_of,
     placed,
+    shown,
 )
 
 MOST_ENTRIES = 1000
@@ -67,11 +66,17 @@ HEAD = (
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
 TABLE = ("x", "y", "z", "file", "interpolation", "outside")
+MEMBERS = ("signals", "inflows", "outflows")
+TERMINAL = ("rule", "description", *MEMBERS, "terminals")
 EVENT = ("when", "while", "where", "reinit", "set")
 HOOK = ("sources", "indicators", "series", "reads")
 SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
 NO_TABLES = ("name", "description", "include", "modes", "code")
+# of a file without equations, whose variables C by hand calculates
+BY_HAND = ("name", "description", "include", "experiment", "sizes", "units", "terminals")
+BY_HAND += ("indicators", "time_events", *SECTIONS)
+OF_EQUATIONS = ("value", "derivative", "shown")
 TABLES = ("reinit", "set", *(key for key in HEAD if key not in NO_TABLES))
 
 
@@ -116,6 +121,8 @@ TEXT = _expect(
     f"a text of at most {LONGEST_TEXT} characters", str, lambda text: len(text) <= LONGEST_TEXT
 )
 LIST = _expect("a list of names", list, lambda names: all(type(name) is str for name in names))
+TRUTH = _expect("true or false", bool, lambda _: True)
+NAMES = _expect("a table of names", dict, lambda table: all(type(x) is str for x in table.values()))
 
 
 def _modes(value: Any) -> list[tuple[str, Any]]:
@@ -168,7 +175,10 @@ READ = {
     "type": _type,
     "variability": TEXT,
     "causality": _expect('"local"', str, lambda value: value == "local"),
-    "shown": _expect("true or false", bool, lambda _: True),
+    **dict.fromkeys(("shown", "time_events"), TRUTH),
+    "rule": _expect('"plug", "bus" or "none"', str, lambda rule: rule in ("plug", "bus", "none")),
+    **dict.fromkeys(MEMBERS, NAMES),
+    **dict.fromkeys(("follows", "indicators"), LIST),
     "description": plain_text,
     "unit": _unit,
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),

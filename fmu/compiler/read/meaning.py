@@ -4,8 +4,6 @@ import math
 from collections.abc import Collection, Mapping
 from graphlib import CycleError, TopologicalSorter
 
-from declaration.load import shown
-
 from ..expressions import dimensions
 from ..expressions.dimensions import Dimension, dimension_of, of_exponents, times
 from ..expressions.expression import (
@@ -20,7 +18,16 @@ from ..expressions.hints import meant
 from ..expressions.indexes import with_elements
 from ..expressions.kinds import CONDITION, kind_of, with_kinds
 from ..units import BASE
-from .content import FOLLOWS, OPTIONS, SWITCHES, Expression, ModelFile, ModelFileError, placed
+from .content import (
+    FOLLOWS,
+    OPTIONS,
+    SWITCHES,
+    Expression,
+    ModelFile,
+    ModelFileError,
+    placed,
+    shown,
+)
 
 SECOND = of_exponents({"s": 1})
 SHORTEST = 1e-12  # s, of periods

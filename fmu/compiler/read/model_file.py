@@ -1,7 +1,7 @@
 """The graph of a file with equations."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pathlib import Path
 
@@ -37,17 +37,15 @@ LEAVES = {
 }
 
 
-def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
+def read(path: Path) -> ModelFile:
     """Read and check a file for values of its expressions; ModelFileError if something is wrong."""
-    file = file_reader.read(path, solver_names)
+    file = file_reader.read(path)
     # without states nothing is integrated: outputs follow at once
     has_switches = file.hook is None and bool(file.of("states") or file.events)
     is_exact = file.hook is None  # C by hand keeps its models where they have values
     graph = Graph(tables=file.tables, has_switches=has_switches, is_guarded=is_exact)
     file.graph, calls = graph, Calls(file.code.program, graph, is_exact) if file.code else None
-    for variable in file.of(*LEAVES):
-        op = "mode" if variable.kind == CONDITION else LEAVES[variable.section]
-        variable.leaf = graph.value(op, name=variable.name)
+    known = leaves(file, graph)
     counts = [v.name for v in file.of(COUNTS)]
     calculated = [v.name for v in file.calculated]
     sections = ("parameters", "inputs", "states", "discrete", OPTIONS, SWITCHES)
@@ -56,9 +54,8 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     if file.hook:
         states = [v.name for v in file.of("states")]
         file.fields = StructFields(file.header.places, RATES, states)
-    known = {variable.name: variable.leaf for variable in file.of(*LEAVES)}
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
-    known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
+    known["pi"] = graph.number(math.pi)
     if calls:
         graph.functions = calls.of(file.code.functions) | _written(file, calls, dict(known))
     counted, checked = {v.name for v in file.calculated if not v.is_real}, {*file.checked}
@@ -103,6 +100,14 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
         for name, node, place in zip(graph.relations, graph.nodes, places, strict=True)
     ]
     return file
+
+
+def leaves(file: ModelFile, graph: Graph) -> dict[str, Value]:
+    """Make the values that nothing calculates, of variables and time; return them by name."""
+    for variable in file.of(*LEAVES):
+        op = "mode" if variable.kind == CONDITION else LEAVES[variable.section]
+        variable.leaf = graph.value(op, name=variable.name)
+    return {v.name: v.leaf for v in file.of(*LEAVES)} | {"time": graph.value("time")}
 
 
 def _check_constant(file: ModelFile, value: Value) -> None:

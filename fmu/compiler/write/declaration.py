@@ -1,30 +1,25 @@
-"""What a model declares (declaration/schema.py), and its page."""
+"""What a model declares (interface.py), and its page."""
 
 import re
 import string
-from collections.abc import Collection, Iterable
-from pathlib import Path
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
-from declaration.load import read as read_declaration
-
+from .. import interface
 from ..expressions.expression import in_order
 from ..expressions.kinds import CONDITION, WHOLE
 from ..graph.graph import MOVING, Relation, Value
+from ..interface import Declaration, Display
 from ..names import Field
+from ..read import by_hand
 from ..read.content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
 from ..read.keys import NUMBERS
-from ..units import STANDARD, parsed, shown
-from . import c_events, c_hook, c_model
-
-INSTANCE = Path(__file__).resolve().parents[3] / "src" / "instance"
-TIME = INSTANCE / "time_variable.toml"
-SOLVER = INSTANCE / "solver_variables.toml"
-EVENTS = INSTANCE / "event_variables.toml"
-TIME_EVENTS = INSTANCE / "time_event_variables.toml"
+from ..units import ANGLE, BASE, STANDARD, parsed, shown
+from . import c_events, c_hook, c_model, lock
+from .lock import Key
 
 FLAT = {"floor", "ceil", "round", "mod", "sign"}
-Key = tuple[str, str]  # name and kind of a variable
 Leaf = tuple[str, str]  # of the graph: operation and name
 TYPES = {CONDITION: "boolean", WHOLE: "int32"}
 CAUSALITIES = {
@@ -39,11 +34,11 @@ CAUSALITIES = {
     "where": "local",
     "outputs": "output",
 }
-
-
-def solver_names() -> list[str]:
-    """Return the names of the variables that models get without declaring them."""
-    return [name for path in (TIME, SOLVER, EVENTS) for name in read_declaration(path).variables]
+USUAL_INITIAL = {"parameter": "exact"}
+USUAL_INITIAL |= dict.fromkeys(("calculatedParameter", "output", "local"), "calculated")
+TIME = interface.Variable(
+    0, "time", "independent", "continuous", "Time", owner="instance", unit="s"
+)
 
 
 def keys(file: ModelFile) -> list[Key]:
@@ -83,10 +78,71 @@ def generated(file: ModelFile) -> dict[str, str]:
     }
 
 
-def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
-    """Write a variables.toml (declaration/schema.py) as nested dictionaries."""
-    relations, indicators, states = file.graph.relations, _indicators(file), file.of("states")
+def declared(file: ModelFile, references: dict[Key, int]) -> Declaration:
+    """Return the declaration of a model."""
+    indicators = (*(file.named_indicators or _indicators(file)),)
+    has_time_events = len(file.graph.located) < len(file.graph.relations) or bool(file.sampled)
+    has_time_events = has_time_events or file.time_events
     units = {name: parsed(name).exponents for name in STANDARD}  # further ones come to it
+    variables = {"time": TIME} | _variables(file, references, units)
+    has_events = bool(indicators) or has_time_events or file.hook is not None
+    for name in _parts_of_instance(file, has_events):
+        variables |= of_instance(name, units)
+    used = {variable.unit for variable in variables.values() if variable.unit}
+    return Declaration(
+        name=file.name,
+        description=file.description or file.name,
+        **_in_c(file),
+        experiment={"start": 0.0} | file.experiment,
+        units={
+            name: {base: units[name][base] for base in (*BASE, ANGLE) if base in units[name]}
+            for name in used
+        },
+        variables=dict(sorted(variables.items(), key=lambda item: item[1].reference)),
+        terminals=file.terminals,
+        indicators=indicators,
+        has_time_events=has_time_events,
+        flat=() if file.is_by_hand else (*flat(file),),
+        modulated=(*modulated(file),),
+    )
+
+
+def _in_c(file: ModelFile) -> dict[str, str]:
+    """Return the header of the model in C, and what it declares."""
+    if not file.is_by_hand:
+        own = {"values": c_hook.structure(file), "symbol": c_hook.symbol(file)}
+        return {"header": "equations.h"} | own
+    stem = file.path.stem
+    return {"header": f"{stem}.h", "values": f"struct {stem}_values", "symbol": f"{stem}_model"}
+
+
+def _parts_of_instance(file: ModelFile, has_events: bool) -> Iterator[str]:
+    """Yield which files of src/instance have variables of a model."""
+    if has_events:
+        yield "event"
+    if file.of("states"):
+        yield "solver"
+    elif file.sampled:
+        yield "time_event"
+
+
+def of_instance(name: str, units: dict[str, dict[str, int]]) -> dict[str, interface.Variable]:
+    """Return the variables of a file of src/instance."""
+    found = _variables(by_hand.of_instance(name), lock.of_instance(), units)
+    return {
+        name: replace(
+            variable,
+            owner="instance",
+            constants=tuple(f"INTEGRATOR_{item.upper()}" for item in variable.items),
+        )
+        for name, variable in found.items()
+    }
+
+
+def _variables(
+    file: ModelFile, references: dict[Key, int], units: dict[str, dict[str, int]]
+) -> dict[str, interface.Variable]:
+    """Return the variables of a file; `units` gets those that it lacks."""
     tables = {v.name: _entries_of(v, file, units) for v in file.variables.values()}
     for state in _without_derivative(file):
         rate = state.exponents | {"s": state.exponents.get("s", 0) - file.has_units}
@@ -100,7 +156,7 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     for mode in file.modes if c_events.has_events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(file.fields.count(mode)) | own
-    for i, (name, relation) in enumerate(indicators.items()):
+    for i, (name, relation) in enumerate(_indicators(file).items()):
         tables[name] = {
             **_local(Field("z", i)),
             "unit": "1",
@@ -110,36 +166,21 @@ def declared(file: ModelFile, references: dict[Key, int]) -> dict[str, Any]:
     for tick in c_events.ticks(file):
         own = {"unit": _unit(units, tick.exponents), "description": tick.description}
         tables[tick.name] = _local(tick.field) | own
-    model = {
-        "name": file.name,
-        "description": file.description or file.name,
-        "header": "equations.h",
-        "values": c_hook.structure(file),
-        "symbol": c_hook.symbol(file),
-        "event_indicators": file.hook.indicators if file.hook else [*indicators],
-        "naming": "structured" if any("[" in name for name, _ in keys(file)) else "flat",
-        "flat": flat(file),
-        "modulated": modulated(file),
-        "time_events": len(indicators) < len(relations) or bool(file.sampled),
-    }
-    includes = [TIME, *([EVENTS] if relations or file.sampled or file.hook else [])]
-    includes += [SOLVER] if states else [TIME_EVENTS] if file.sampled else []
-    helpers = {variable.name for variable in file.of("where")}  # last
     return {
-        "include": [str(path) for path in includes],
-        "model": model,
-        "experiment": {"start": 0.0} | file.experiment,
-        "units": {name: units[name] for name in units if name not in STANDARD},
-        "variables": {
-            name: {"reference": references[name, kind], **tables[name]}
-            for name, kind in sorted(keys(file), key=lambda key: key[0] in helpers)
-            if name in tables
-        },
-        "terminals": {
-            name: terminal.model_dump(exclude_defaults=True)
-            for name, terminal in file.terminals.items()
-        },
+        name: interface.Variable(references[name, kind], **_with_usual(tables[name]))
+        for name, kind in keys(file)
+        if name in tables
     }
+
+
+def _with_usual(entries: dict[str, Any]) -> dict[str, Any]:
+    """Return the entries of a variable with those that follow from its causality and type."""
+    usual: dict[str, Any] = {"initial": USUAL_INITIAL.get(entries["causality"])}
+    if entries.get("type") == "boolean":
+        usual |= {"min": 0, "max": 1}
+    if items := entries.get("items"):
+        usual |= {"min": 1, "max": len(items)}
+    return usual | entries
 
 
 def flat(file: ModelFile) -> list[str]:
@@ -223,9 +264,10 @@ def _entries_of(
         entries |= {"variability": "fixed" if is_fixed else "tunable"}
         entries |= _dependencies(variable.value, file)
     if variable.section == "states":
-        entries |= {"initial": "exact", "dependencies": [variable.name]}
-        is_written = any(variable.name in change.reinit for change in file.changes)
-        entries["reinit"] = is_written or file.hook is not None
+        entries |= {"initial": "exact", "dependencies": (variable.name,)}
+        by_events = any(variable.name in change.reinit for change in file.changes)
+        in_c = file.hook is not None or bool(file.indicators) or file.time_events
+        entries["reinit"] = by_events or in_c
     if variable.section == "discrete":
         entries |= {"variability": "discrete", "initial": "exact"}
         leaves = _reached({("discrete", variable.name)}, file, ["discrete"])
@@ -238,13 +280,12 @@ def _entries_of(
     with placed(file.path, variable.place, variable.name, "unit"):
         entries["unit"] = _unit(units, variable.exponents, variable.unit)
     if variable.display:
-        entries["display"] = dict(zip(("name", "factor", "offset"), variable.display, strict=True))
+        entries["display"] = Display(*variable.display)
     keys = NUMBERS if entries.get("initial") != "calculated" else NUMBERS[1:]
     numbers = {key: getattr(variable, key) for key in keys}
     entries |= {key: number for key, number in numbers.items() if number is not None}
     is_derivative = bool(variable.derivative_of) and variable.section != "states"
-    is_indicator = file.hook is not None and variable.name in file.hook.indicators
-    if variable.section == "outputs" or is_derivative or is_indicator:
+    if variable.section == "outputs" or is_derivative or variable.name in file.named_indicators:
         entries |= _dependencies(variable.value, file)
     if variable.derivative_of:
         entries["derivative_of"] = variable.derivative_of
@@ -265,7 +306,7 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
         "variability": variability,
     }
     if isinstance(kind, tuple):
-        entries["items"] = {item: {"description": kind.descriptions[item]} for item in kind}
+        entries["items"] = kind.descriptions
     bounds = {"min": variable.min, "max": variable.max}
     entries |= {key: number for key, number in bounds.items() if number is not None}
     if is_calculated:
@@ -275,8 +316,7 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
         entries |= _known_of(changed, file)
         entries |= _initially({leaf}, {}, file)
     else:
-        start = variable.start
-        entries["start"] = kind[start - 1] if isinstance(kind, tuple) else start
+        entries["start"] = variable.start
     return entries | {"description": variable.description or variable.name}
 
 
@@ -297,14 +337,14 @@ def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str
     return name
 
 
-def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
-    """What a calculated variable follows from, by the keys of variables.toml."""
+def _dependencies(value: Value, file: ModelFile) -> dict[str, tuple[str, ...]]:
+    """What a calculated variable follows from, as interface.Variable has it."""
     leaves = _reached(value.leaves, file, ["discrete"])
     known = _known_of(leaves, file)
     return known | _initially(leaves, known, file)
 
 
-def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, list[str]]:
+def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, tuple[str, ...]]:
     """Dependencies and parameters among what these leaves follow from."""
     moving = {name for op, name in leaves if op in MOVING or _is_in(file, name, SWITCHES)}
     parameters = {name for op, name in leaves if op == "parameter" or _is_in(file, name, OPTIONS)}
@@ -314,9 +354,9 @@ def _known_of(leaves: set[Leaf], file: ModelFile) -> dict[str, list[str]]:
     }
 
 
-def _in_order(names: set[str], file: ModelFile) -> list[str]:
+def _in_order(names: set[str], file: ModelFile) -> tuple[str, ...]:
     hidden = {variable.name for variable in file.variables.values() if not variable.shown}
-    return sorted((names & file.places.keys()) - hidden, key=file.places.__getitem__)
+    return (*sorted((names & file.places.keys()) - hidden, key=file.places.__getitem__),)
 
 
 def _is_in(file: ModelFile, name: str, *sections: str) -> bool:
@@ -359,8 +399,8 @@ def _all_known(file: ModelFile) -> set[Leaf]:
 
 
 def _initially(
-    leaves: set[Leaf], known: dict[str, list[str]], file: ModelFile
-) -> dict[str, list[str]]:
+    leaves: set[Leaf], known: dict[str, tuple[str, ...]], file: ModelFile
+) -> dict[str, tuple[str, ...]]:
     """What it follows from at the end of the initialization, when events may happen."""
     found = _reached(leaves, file, ["state", "mode", "discrete"])
     # a tick at the start takes the start values of discrete variables

@@ -6,13 +6,14 @@ ever was: its name and its value reference. It grows and never changes.
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
 from ..read.content import ModelFileError
-from .declaration import Key
+from ..read.file import INSTANCE
 
+Key = tuple[str, str]  # name and kind of a variable
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 99_999
 # longer than in a file: der_ and others stand in front
@@ -41,6 +42,11 @@ def references(path: Path, wanted: list[Key]) -> dict[Key, int]:
     return found
 
 
+def of_instance() -> dict[Key, int]:
+    """Return references of the variables that models have without declaring them."""
+    return _read(INSTANCE / "variables.lock.toml", reserved=())
+
+
 def text(name: str, found: dict[Key, int]) -> str:
     """Return the text of the lock file."""
     kinds: dict[str, list[str]] = {}
@@ -54,11 +60,11 @@ def _key(name: str) -> str:
     return name if BARE.fullmatch(name) else f'"{name}"'
 
 
-def _read(path: Path) -> dict[Key, int]:
+def _read(path: Path, reserved: Collection[int] = RESERVED) -> dict[Key, int]:
     try:
         found: dict[Key, int] = {}
         for name, kind, reference in _entries(tomllib.loads(path.read_text(encoding="utf-8"))):
-            _check(name, kind, reference)
+            _check(name, kind, reference, reserved)
             if (name, kind) in found or reference in found.values():
                 raise ValueError(f"{name} or reference {reference} is there twice")
             found[name, kind] = reference
@@ -88,10 +94,10 @@ def _entries(content: dict[str, Any]) -> Iterator[tuple[Any, Any, Any]]:
         yield entry["name"], entry["kind"], entry["reference"]
 
 
-def _check(name: Any, kind: Any, reference: Any) -> None:
+def _check(name: Any, kind: Any, reference: Any, reserved: Collection[int]) -> None:
     """Raise ValueError where no such variable can be; True would be a number, too."""
     fine = isinstance(name, str) and ELEMENT.fullmatch(name)
     fine = fine and isinstance(kind, str) and kind.isalpha()
-    if not (fine and type(reference) is int and 0 < reference <= LARGEST) or reference in RESERVED:
+    if not (fine and type(reference) is int and 0 < reference <= LARGEST) or reference in reserved:
         entry = f"{name} = {reference} of kind {kind}"
         raise ValueError(f"{entry:.100} has no name, kind and free reference")

@@ -1,7 +1,6 @@
 """Writes what C needs of a declaration: value_references.h and the table in variables.c."""
 
-from declaration.load import Declaration
-from declaration.schema import Enumeration, Variable
+from ..interface import Declaration, Variable
 
 # C sets and reads calculated parameters like locals
 CAUSALITIES = {"calculatedParameter": "LOCAL"}
@@ -9,10 +8,10 @@ C_TYPES = {"float64": "double", "int32": "int", "enumeration": "int", "boolean":
 
 
 def value_references(declaration: Declaration) -> str:
-    name = declaration.model.name
+    name = declaration.name
     prefix = macro_prefix(name)
     lines = [
-        "/* Generated from variables.toml. */",
+        "/* Generated from the declaration of the model. */",
         "#pragma once",
         "",
         f'#define {prefix}_NAME "{name}"',
@@ -37,8 +36,8 @@ def macro_prefix(name: str) -> str:
 
 def variable_table(declaration: Declaration) -> str:
     """Text of variables.c: the rows, and the check that each field has the declared type."""
-    model, variables = declaration.model, declaration.variables
-    structures = {"model": model.values, "instance": "struct instance_values"}
+    variables = declaration.variables
+    structures = {"model": declaration.values, "instance": "struct instance_values"}
     checks, rows = [], []
     for name, variable in variables.items():
         structure = structures[variable.owner]
@@ -47,9 +46,9 @@ def variable_table(declaration: Declaration) -> str:
     row_of = {v.reference: row for row, v in enumerate(variables.values())}
     entries = [str(row_of.get(reference, -1)) for reference in range(max(row_of, default=-1) + 1)]
     lines = [
-        "/* Generated from variables.toml. */",
+        "/* Generated from the declaration of the model. */",
         '#include "instance.h"',
-        f'#include "{model.header}"',
+        f'#include "{declaration.header}"',
         '#include "model_description.h"',
         "",
         "#include <math.h>",
@@ -66,16 +65,16 @@ def variable_table(declaration: Declaration) -> str:
         "",
         *indicator_list(declaration),
         "const struct model_description model_description = {",
-        f'    .name = "{model.name}",',
+        f'    .name = "{declaration.name}",',
         f'    .guid = "{declaration.guid}",',
-        f"    .default_tolerance = {declaration.experiment.tolerance!r},",
-        f"    .model = &{model.symbol},",
+        f"    .default_tolerance = {declaration.experiment['tolerance']!r},",
+        f"    .model = &{declaration.symbol},",
         "    .variables = variables,",
         "    .variable_count = sizeof variables / sizeof variables[0],",
         "    .row_of_reference = row_of_reference,",
         "    .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],",
-        *(INDICATORS if model.event_indicators else []),
-        *(["    .has_time_events = true,"] if model.time_events else []),
+        *(INDICATORS if declaration.indicators else []),
+        *(["    .has_time_events = true,"] if declaration.has_time_events else []),
         "};",
         "",
         f'const char model_token_fmi3[] = "{declaration.token("fmi3")}";',
@@ -91,7 +90,7 @@ INDICATORS = [
 
 def indicator_list(declaration: Declaration) -> list[str]:
     """The value references of the event indicators; empty without any."""
-    names = declaration.model.event_indicators
+    names = declaration.indicators
     references = ", ".join(str(declaration.variables[name].reference) for name in names)
     return [f"static const unsigned indicators[] = {{{references}}};", ""] if names else []
 
@@ -103,18 +102,15 @@ def type_checks(name: str, variable: Variable, structure: str) -> list[str]:
         f"_Static_assert(_Generic((({structure} *)0)->{field}, {c_type}: 1, "
         f'default: 0), "{name}: {field} must be of type {c_type}");'
     ]
-    items = variable.items.values() if isinstance(variable, Enumeration) else ()
     checks += [
-        f'_Static_assert({item.constant} == {value}, "{name}: {item.constant} must be {value}");'
-        for value, item in enumerate(items, start=1)
-        if item.constant
+        f'_Static_assert({constant} == {value}, "{name}: {constant} must be {value}");'
+        for value, constant in enumerate(variable.constants, start=1)
     ]
     return checks
 
 
 def table_row(name: str, variable: Variable, structure: str) -> str:
     """A row of the table: struct variable of src/instance/variables.h."""
-    nominal = getattr(variable, "nominal", None)
     return (
         f'    {{{variable.reference}, "{name}", VARIABLE_{variable.type.upper()}, '
         f"VARIABLE_OF_{variable.owner.upper()}, offsetof({structure}, {variable.field}),\n"
@@ -122,7 +118,7 @@ def table_row(name: str, variable: Variable, structure: str) -> str:
         f"VARIABILITY_{variable.variability.upper()}, "
         f"INITIAL_{(variable.initial or 'none').upper()},\n"
         f"     {c_number(variable.start, '0.0')}, {c_number(variable.min, '-INFINITY')}, "
-        f"{c_number(variable.max, 'INFINITY')}, {c_number(nominal, '1.0')}}},"
+        f"{c_number(variable.max, 'INFINITY')}, {c_number(variable.nominal, '1.0')}}},"
     )
 
 
