@@ -19,7 +19,7 @@ EQUATIONS = ".toml"  # suffix of their files
 WARNINGS, WARNING = "warnings", "warning: "  # what is kept beside the files, and how a line begins
 
 # packages that the program imports
-NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser", "pydantic")
+NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser")
 
 
 def build(

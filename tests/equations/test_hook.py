@@ -7,7 +7,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from tests.equations.compiled import ModelFileError, declaration, read
+from tests.equations.compiled import ModelFileError, read
 from tests.equations.examples import METHODS, build, simulated
 
 BEAD = Path(__file__).with_name("bead")
@@ -78,6 +78,6 @@ def test_what_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
     assert old in text
     (folder / "bead.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ModelFileError) as error:
-        read(folder / "bead.toml", declaration.solver_names())
+        read(folder / "bead.toml")
     assert said in str(error.value)
     assert "\n" not in str(error.value)

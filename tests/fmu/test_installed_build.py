@@ -182,8 +182,8 @@ def test_what_is_not_installed_is_named(
     (hidden / "__init__.py").unlink()
     hidden.rmdir()
     monkeypatch.setattr(project, "INSTALLED", True)
-    monkeypatch.setattr(project, "find_spec", lambda name: None if name == "pydantic" else True)
-    with pytest.raises(UserError, match=r'^pydantic: not installed, pip install "rparm\[build\]"'):
+    monkeypatch.setattr(project, "find_spec", lambda name: None if name == "pycparser" else True)
+    with pytest.raises(UserError, match=r'^pycparser: not installed, pip install "rparm\[build\]"'):
         rparm.build(model)
 
 
