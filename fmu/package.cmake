@@ -13,7 +13,6 @@
 #   NAME_sources, ..._release  for the release: source_code.cmake, release.cmake
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
-include(${FMU_SOURCE_DIR}/derive.cmake)
 include(${FMU_SOURCE_DIR}/release.cmake)
 include(${FMU_SOURCE_DIR}/source_code.cmake)
 

@@ -89,8 +89,6 @@ ${entries}]}
     VERBATIM)
   add_custom_target(${name} DEPENDS ${description})
   foreach(library IN LISTS libraries)
-    if(TARGET ${library}_derived) # derive.cmake
-      add_dependencies(${name} ${library}_derived)
-    endif()
+    add_dependencies(${name} ${library}) # headers that are made with it
   endforeach()
 endfunction()

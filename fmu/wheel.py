@@ -29,8 +29,7 @@ OF_MODELS = (".csv", ".json", ".py", ".svg", ".toml")
 OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/**/*.in", "fmu/*.css", "fmu/*.html")
 OF_FMU += ("src/instance/*.toml",)
 # modules that are not for a model
-OF_RELEASES = ("bill_of_materials", "built", "derive", "pieces", "references", "wheel")
-OF_RELEASES += ("blocks", "derived")  # of the compiler: they write C of models
+OF_RELEASES = ("bill_of_materials", "built", "pieces", "references", "wheel")
 # the FMUs are there, with their pictures
 OF_DEVELOPERS = ("model.svg", "make_references.py", "reference_files.py")
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads

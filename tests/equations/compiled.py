@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -84,9 +85,12 @@ class Model:
             library.write_bytes(found["model.so"])
         self.library = ctypes.CDLL(str(library))
         self.words = Words.in_dll(self.library, "equations_model")
-        text = (folder / "equations.h").read_text()
-        names = [line.split()[1].rstrip(";") for line in text.splitlines() if "double" in line]
-        self.names = [name.removeprefix("v_") for name in names]
+        text, fields = (folder / "equations.h").read_text(), self.file.fields
+        states = [v.name for v in self.file.of("states")]
+        names = {fields.value(v.name): v.name for v in self.file.variables.values() if v.is_real}
+        names |= {fields.rate(name): f"d_{name}" for name in states}
+        self.names = [names.get(place, place) for place in places("double", text)]
+        self.ints = places("int", text)  # behind the doubles
 
     def values(self, **given: float) -> np.ndarray:
         """A value structure as an array; behind the doubles there are ints, the modes."""
@@ -150,6 +154,16 @@ class Model:
         for of, first, end in calls:
             assert call(ctypes.addressof(of), first, end, rows.ctypes.data) == 0
         return rows[: len(states), : last + 1]
+
+
+def places(kind: str, text: str) -> list[str]:
+    """Fields of a type in equations.h, each element of an array."""
+    found = re.findall(rf"^    {kind} (\w+)(?:\[(\d+)\])?;", text, re.MULTILINE)
+    return [
+        place
+        for name, size in found
+        for place in ([f"{name}[{i}]" for i in range(int(size))] if size else [name])
+    ]
 
 
 def declared(file: ModelFile) -> Declaration:

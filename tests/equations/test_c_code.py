@@ -1,13 +1,12 @@
 """Equations in plain C: what is refused, and derivatives of what is read.
 
-Derived C is compiled and compared with sympy, and values that the graph has with the text itself.
+Compiled models of them are compared with sympy.
 """
 
-import ctypes
 import math
 import random
 import re
-import subprocess
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 import sympy
 
+from tests.equations.compiled import Model
 from tests.equations.examples import MISTAKES, MODELS
 from tests.support.paths import ROOT
 from tests.support.tables import cases
@@ -25,11 +25,24 @@ from compiler.graph.graph import Graph  # noqa: E402
 from compiler.plain_c.interpreter import Interpreter  # noqa: E402
 from compiler.plain_c.text import CTextError, read  # noqa: E402
 from compiler.plain_c.values import Conditions  # noqa: E402
-from compiler.write.derived import Derived, Wanted  # noqa: E402
+from compiler.read.header import made  # noqa: E402
 from compiler.write.guards import settled  # noqa: E402
 
-REAL = '#include "real.h"\n'
-WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wpedantic", "-Werror"]
+FILE = """
+name = "F"
+code = "text.h"
+[discrete]
+m = { type = "Integer", min = 0, max = 2 }
+[outputs]
+"y[i]" = { for = "i = 0..1" }
+[states]
+"x[i]" = { for = "i = 0..1", derivative = "y[i]" }
+"""
+CALCULATE = """
+static void model_calculate(struct model_values *values) {
+    f(values->x, values->m, values->y);
+}
+"""
 GENERATOR = np.random.default_rng(1)
 
 
@@ -90,9 +103,11 @@ def test_mutants_are_read_or_refused_in_a_line(tmp_path: Path, seed: int) -> Non
     word, other = generator.choice(words), generator.choice(words)[0]
     mutant = f"{text[: word.start()]} {other} {text[word.end() :]}"
     folders = [ROOT / "models", ROOT / "models/rp_manipulator"]
-    wanted = Wanted.read("J = jacobian of arm_accelerations by q dq tau")
     try:
-        Derived(read(written(tmp_path, mutant), folders)).text([wanted], "text.h")
+        program = read(written(tmp_path, mutant), folders, made=made)
+        graph = Graph(has_switches=False, is_guarded=False)
+        leaves = Interpreter(program, graph)
+        leaves.run("arm_accelerations", lambda place, _: graph.value("state", name=str(place)))
     except CTextError as error:
         assert re.match(r"\w+\.h:\d+: [^\n]+$", str(error))
 
@@ -113,53 +128,38 @@ def test_a_choice_that_the_block_around_it_has_made_is_gone() -> None:
 # ---- Derivatives ---------------------------------------------------------------------------------
 
 
-class Compiled:
-    """f(x, y), its Jacobian by x and its derivatives along a curve of x; m: an int."""
-
-    def __init__(self, folder: Path, text: str, n: int, compiler: str = "gcc") -> None:
-        text = REAL + f"enum {{ N = {n} }};\n" + text + (
-            "void f_jacobian(const double x[N], int m, double J[]);\n"
-            "void f_derivatives(const double x[N], int m, const double first[N], double y_first[2],"
-            " const double second[N], double y_second[2]);\n"
-        )  # fmt: skip
-        header = written(folder, text)
-        wanted = ("f_jacobian = jacobian of f by x", "f_derivatives = derivatives of f by x")
-        program = read(header, [ROOT / "models"])
-        derived = Derived(program, {"m": ("0", "1", "2")})
-        source = written(folder, derived.text(map(Wanted.read, wanted), "text.h"), "derived.c")
-        head = "void g(const double x[N], int m, double y[2])"
-        call = f'#include "text.h"\n{head};\n{head} {{ f(x, m, y); }}\n'
-        values = written(folder, call, "g.c")
-        library = folder / "derived.so"
-        subprocess.run(
-            [compiler, "-std=c17", "-O1", "-ffp-contract=off", *WARNINGS, "-Wno-unused-parameter",
-             f"-I{ROOT / 'models'}", "-shared", "-fPIC", source, values, "-lm", "-o", library],
-            check=True,
-        )  # fmt: skip
-        self.library, self.n = ctypes.CDLL(str(library)), n
-
-    def value(self, x: np.ndarray, m: int) -> np.ndarray:
-        y = np.zeros(2)
-        self.library.g(pointer(x), m, pointer(y))
-        return y
-
-    def jacobian(self, x: np.ndarray, m: int) -> np.ndarray:
-        result = np.zeros((self.n, 2))
-        self.library.f_jacobian(pointer(x), m, pointer(result))
-        return result.T
-
-    def derivatives(self, x: np.ndarray, m: int, first: np.ndarray, second: np.ndarray) -> list:
-        results = [np.zeros(2), np.zeros(2)]
-        given = pointer(x), m, pointer(first), pointer(results[0]), pointer(second)
-        self.library.f_derivatives(*given, pointer(results[1]))
-        alone = np.zeros(2)
-        self.library.f_derivatives(*given[:3], pointer(alone), pointer(second), None)
-        assert np.array_equal(alone, results[0])
-        return results
+def compiled(folder: Path, text: str, n: int) -> Model:
+    """A model whose outputs y are f(x, m, y); the first two states have them as derivatives."""
+    shutil.copy(ROOT / "models" / "real.h", folder)
+    head = f'#include "model_values.h"\n#include "real.h"\nenum {{ N = {n} }};\n'
+    written(folder, head + text + CALCULATE)
+    others = f'"x[j]" = {{ for = "j = 2..{n - 1}", derivative = "0" }}'
+    return Model(folder, FILE + others * (n > 2))
 
 
-def pointer(x: np.ndarray) -> ctypes.c_void_p:
-    return x.ctypes.data_as(ctypes.c_void_p)
+class Point:
+    """Values of x and m, and what follows from them."""
+
+    def __init__(self, model: Model, x: np.ndarray, m: int) -> None:
+        self.model, self.n = model, len(x)
+        self.values = self.curve(x)
+        ints = self.values.view(np.int32)[2 * len(model.names) :]
+        ints[model.ints.index("is_begun")], ints[model.ints.index("m_m")] = 1, m
+        model.outputs(self.values, 0.0)
+        self.y = self._y(self.values)
+        self.jacobian = model.jacobian(self.values, 0.0)[:2]
+
+    def curve(self, x: np.ndarray) -> np.ndarray:
+        return self.model.values(**{f"x[{i}]": value for i, value in enumerate(x)})
+
+    def _y(self, values: np.ndarray) -> list[float]:
+        return [values[self.model.names.index(f"y[{i}]")] for i in (0, 1)]
+
+    def derivatives(self, first: np.ndarray, second: np.ndarray) -> list[list[float]]:
+        """First and second ones of y along a curve of x."""
+        found = [self.curve(first), self.curve(second)]
+        self.model.derivatives(self.values, 0.0, 1.0, *found)
+        return [self._y(values) for values in found]
 
 
 Formula = Callable[[list, int], list]
@@ -204,31 +204,26 @@ def all_that_is_read(x: list, m: int) -> list:
     return [z[0] + 3 * z[2] + early * held, m * (x[0] ** 2 + shift) + last]
 
 
-@pytest.mark.parametrize(
-    ("name", "compiler"), [*((name, "gcc") for name in FORMULAS), ("all that is read", "clang")]
-)
-def test_derivatives_are_those_of_sympy(tmp_path: Path, name: str, compiler: str) -> None:
+@pytest.mark.parametrize("name", FORMULAS)
+def test_derivatives_are_those_of_sympy(tmp_path: Path, name: str) -> None:
     n, formula = FORMULAS[name]
-    try:
-        compiled = Compiled(tmp_path, MODELS["c_code"][name], n, compiler)
-    except FileNotFoundError:
-        pytest.skip(f"{compiler} is not there")
+    model = compiled(tmp_path, MODELS["c_code"][name], n)
     symbols = list(sympy.symbols(f"x:{n}"))
     t = sympy.Symbol("t")
     for m in range(3):
         x, first, second = GENERATOR.uniform(0.3, 1.5, (3, n))
         rest = {"held": x[0], "shift": x[1] - x[0] ** 2}
         at = dict(zip(symbols, x, strict=True)) | {sympy.Symbol(k): v for k, v in rest.items()}
-        y = sympy.Matrix(formula(symbols, m))
-        assert compiled.value(x, m) == pytest.approx(numbers(y, at), rel=1e-13)
-        assert compiled.jacobian(x, m) == pytest.approx(numbers(y.jacobian(symbols), at), rel=1e-12)
+        y, point = sympy.Matrix(formula(symbols, m)), Point(model, x, m)
+        assert point.y == pytest.approx(numbers(y, at), rel=1e-13)
+        assert point.jacobian == pytest.approx(numbers(y.jacobian(symbols), at), rel=1e-12)
 
         curve = {s: a + b * t + c * t**2 / 2
                  for s, a, b, c in zip(symbols, x, first, second, strict=True)}  # fmt: skip
         along = y.subs(curve)
         start = {t: 0} | {sympy.Symbol(k): v for k, v in rest.items()}
         expected = [numbers(along.diff(t, order), start) for order in (1, 2)]
-        found = compiled.derivatives(x, m, first, second)
+        found = point.derivatives(first, second)
         assert found[0] == pytest.approx(expected[0], rel=1e-12)
         assert found[1] == pytest.approx(expected[1], rel=1e-11, abs=1e-11)
 
@@ -240,21 +235,11 @@ def numbers(matrix: sympy.Matrix, at: dict) -> np.ndarray:
 
 def test_only_the_branch_of_a_mode_is_calculated(tmp_path: Path) -> None:
     """A root that is not defined in another mode is not taken there."""
-    compiled = Compiled(tmp_path, MODELS["c_code"]["a root of a mode"], 2)
-    source = (tmp_path / "derived.c").read_text(encoding="utf-8")
-    first = source[source.index("f_derivatives_first") : source.index("f_derivatives_second")]
-    assert first.count("if (") == 1
-    assert first.count("exp(") == 1
+    model = compiled(tmp_path, MODELS["c_code"]["a root of a mode"], 2)
+    source = (tmp_path / "equations.c").read_text(encoding="utf-8")
+    outputs = source[source.index("enum status outputs") : source.index("enum status derivatives")]
+    assert outputs.count("if (") == 1
+    assert outputs.count("exp(") == 1
     x = np.array([-1.0, 0.5])
-    assert np.isfinite(compiled.jacobian(x, 0)).all()
-    assert math.isnan(compiled.jacobian(x, 2)[0, 0])
-
-
-def test_names_and_order_are_those_of_the_source(tmp_path: Path) -> None:
-    Compiled(tmp_path, MODELS["c_code"]["names"], 2)
-    source = (tmp_path / "derived.c").read_text(encoding="utf-8")
-    assert "const double inertia = 1.0 + x_0 * x_0;" in source
-    assert "inertia_by_x0" in source
-    assert "d_inertia" in source
-    assert "Derived from equations in plain C" in source
-    assert "text.h" in source.partition("*/")[0]
+    assert np.isfinite(Point(model, x, 0).jacobian).all()
+    assert math.isnan(Point(model, x, 2).jacobian[0, 0])

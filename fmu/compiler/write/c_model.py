@@ -191,19 +191,19 @@ def _smooth(file: ModelFile) -> dict[str, Any]:
 
 
 def _where_it_moves(file: ModelFile, rate: Value, slope: Value) -> Value:
-    """Leave out what follows from a state that rests, by the conditions on which its rate is 0.
+    """Leave out what follows from a state in the modes in which it rests: its rate is 0 there.
 
     An elimination that exchanges rows would mix the rounding of others into it. With a hook, a
     state whose rate is another state rests with that one.
     """
     if rate.op == "state" and file.hook:
         rate = file.variables[rate.name].value
-    if is_number(rate, 0.0):
-        return rate
     if rate.op != "if" or rate.arguments[0].moves:
         return slope
     condition, *cases = rate.arguments
-    first, second = (_where_it_moves(file, case, slope) for case in cases)
+    first, second = (
+        case if is_number(case, 0.0) else _where_it_moves(file, case, slope) for case in cases
+    )
     return slope if first is second else file.graph.value("if", condition, first, second)
 
 
