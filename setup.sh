@@ -4,7 +4,7 @@
 #
 #   ./setup.sh              for building and ./run.sh
 #   ./setup.sh --LIST       what requirements/LIST.txt names, too: ./run.sh asks for what a command needs
-#   ./setup.sh --control    so for ./run.sh prove --check
+#   ./setup.sh --control    so for ./run.sh linearize, identify
 #   ./setup.sh --release    so for ./release.sh
 #   ./setup.sh --dev        for ./test.sh too
 #   ./setup.sh --platforms  for ./test.sh --all too: clang, analysers, other platforms, browsers

@@ -1,7 +1,7 @@
 """Packs all that is built for each platform but the FMUs, for an installed package: built.tar.xz.
 
 PLATFORM.json        runtime.json of the platform (runtime.cmake), with paths that begin here
-PLATFORM/            the objects and libraries it names, and the program proof/prove
+PLATFORM/            the objects and libraries it names, and motions that can be proven
 project/, musl/ ...  the sources it names, the same for all, and all that these include
 playground/          the page for a browser
 """
@@ -63,7 +63,6 @@ def packed(files: Iterable[tuple[str, bytes]]) -> bytes:
         for name, content in sorted(files):
             info = tarfile.TarInfo(name)
             info.size = len(content)
-            info.mode = 0o755 if "/proof/prove" in name else 0o644
             target.addfile(info, io.BytesIO(content))
     return lzma.compress(archive.getvalue(), preset=9 | lzma.PRESET_EXTREME)
 

@@ -36,13 +36,10 @@ endfunction()
 
 set(platform_targets "")
 set(platform_builds "")
-set(platform_provers "")
 foreach(platform IN LISTS RELEASE_PLATFORMS)
-  add_platform(${platform} libraries runtime prove)
+  add_platform(${platform} libraries runtime motions)
   list(APPEND platform_targets platform_${platform})
   list(APPEND platform_builds ${PROJECT_BINARY_DIR}/platforms/${platform})
-  set(prover ${PROJECT_BINARY_DIR}/platforms/${platform}/proof/prove)
-  list(APPEND platform_provers ${prover}$<$<STREQUAL:${platform},x86_64-windows>:.exe>)
 endforeach()
 
 # library_of(platform below name result): the shared object of an FMU for a platform.
@@ -122,7 +119,7 @@ function(add_release)
     OUTPUT ${built}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/built.py ${platform_builds} ${PROJECT_BINARY_DIR}/platforms/wasm32-wasi
             --page ${page} --output ${built}
-    DEPENDS ${platform_targets} ${libraries} ${platform_provers} playground ${page}
+    DEPENDS ${platform_targets} ${libraries} playground ${page}
             ${FMU_SOURCE_DIR}/built.py ${FMU_SOURCE_DIR}/source_code.py
     COMMENT "Packing what is built for all platforms"
     VERBATIM)

@@ -12,7 +12,7 @@ models/MODEL/start.toml                 values that a new scenario of the model 
 models/SYSTEM/system.svg                its components and the signals between them
 models/*/animation.py                   what of a run the report animates
 models/SYSTEM/identification.py         makes a log of the system, to identify parameters from
-build/proof/prove                       encloses motions; MODEL.json beside it are those of models
+build/proof/MODEL.json                  the motion of a model, which proofs enclose
 fmu/equations_to_motion.py              writes such a file, in a separate process
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
@@ -270,24 +270,10 @@ def fmu_of(subject: Path, option: str = "", version: str = VERSIONS[0]) -> Path:
     return built(subject, ".fmu", option, version) if subject.is_dir() else subject
 
 
-def proof_folder() -> Path:
-    """Return the folder of the program that encloses motions, and of the models' motions."""
-    return (built_for_all() / platform_name() if INSTALLED else ROOT / "build") / "proof"
-
-
 def motion_file(name: str) -> Path:
     """Return the file with the motion of a model, which only models of equations have."""
-    return proof_folder() / f"{name}.json"
-
-
-def proof_program() -> Path:
-    """Return the program that encloses motions; UserError if it is not there."""
-    program = proof_folder() / "prove"
-    program = program.with_suffix(".exe") if os.name == "nt" else program
-    if not os.access(program, os.X_OK):
-        way_out = "RPARM_CACHE names another folder" if INSTALLED else f"{PROGRAM} builds it"
-        raise UserError(f"{program}: cannot be run; {way_out}")
-    return program
+    folder = built_for_all() / platform_name() if INSTALLED else ROOT / "build"
+    return folder / "proof" / f"{name}.json"
 
 
 def platform_name() -> str:

@@ -59,13 +59,13 @@ def unpacked(archive: Path, cache: Path) -> Path:
             for entry in opened:
                 file = opened.extractfile(entry)
                 assert file is not None  # the archive has no folders
-                _write(folder / entry.name, file.read(), bool(entry.mode & 0o100))
+                _write(folder / entry.name, file.read())
     except (OSError, lzma.LZMAError, tarfile.TarError) as error:
         raise UserError(f"{archive}: damaged, install rparm again: {reason(error)}") from error
     return folder
 
 
-def _write(path: Path, content: bytes, is_program: bool = False) -> None:
+def _write(path: Path, content: bytes) -> None:
     """Write a file that is not there or has other bytes; UserError if it cannot be written."""
     try:
         if path.is_file() and path.read_bytes() == content:
@@ -76,8 +76,6 @@ def _write(path: Path, content: bytes, is_program: bool = False) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole(path) as temporary:
             temporary.write_bytes(content)
-            if is_program:
-                temporary.chmod(0o755)
     except OSError as error:
         text = f"{reason(error)}; RPARM_CACHE names another folder"
         raise UserError(f"{path}: cannot be written: {text}") from error

@@ -42,13 +42,13 @@ def do_prove(options: argparse.Namespace) -> Ended:
     with _opened(path) as (fmu, scenario):
         methods = proof.methods_of(fmu, options.method)
         within = _within(options.within, program, fmu)
-        enclosure = _enclosure(program, scenario, within)
+        enclosure = _enclosure(program, scenario, within, options.check)
         stopped = enclosure.stopped
         if stopped and not stopped.is_event:
             return Ended(1, f"failed: {stopped}", {"holds_up_to": stopped.time})
         good = None
         if path.resolve() in {file.resolve() for file in project.scenario_files().values()}:
-            exact = _enclosure(program, scenario, {}) if within else enclosure
+            exact = _enclosure(program, scenario) if within else enclosure
             good = _reference(fmu, scenario, exact)
         states = enclosure.of(program.states)
         found, courses = _runs(fmu, scenario, states, methods, options.tolerance)
@@ -56,14 +56,14 @@ def do_prove(options: argparse.Namespace) -> Ended:
             page = proof_page.write(
                 options.report, scenario, fmu.model, states, courses, good, _command(options)
             )
-    checked = _checked(program, {scenario: enclosure}) if options.check else {}
+    checked = _checked(enclosure.checked) if options.check else {}
     largest = max(e.error for errors in found.values() for e in errors.values())
     verdict = f"largest proven error: {rounded_up(largest, 2)}"
     methods = {m: {n: asdict(e) for n, e in errors.items()} for m, errors in found.items()}
     document = {"methods": methods} | ({"reference": asdict(good)} if good else {})
     document |= {"page": page.absolute()} | checked
     if stopped:
-        document |= {"holds_up_to": stopped.time, "event": stopped.reason}
+        document |= {"holds_up_to": stopped.time, "event": stopped.reason, "event_by": stopped.by}
         verdict = f"{verdict}; {stopped}"
     if good and not good.passed:
         return Ended(1, _verdict([good]), document, page=page)
@@ -130,9 +130,11 @@ def _within(given: str | None, program: Prover, fmu: Fmu) -> dict[str, float]:
     return found
 
 
-def _enclosure(program: Prover, scenario: Scenario, within: dict[str, float]) -> Enclosure:
+def _enclosure(
+    program: Prover, scenario: Scenario, within: Mapping[str, float] = {}, check: bool = False
+) -> Enclosure:
     with Progress(f"{scenario.name}, proof", len(scenario.times) - 1) as progress:
-        enclosure = program.enclose(scenario, within, progress)
+        enclosure = program.enclose(scenario, within, progress, check=check)
     if len(enclosure.starts) > 1:
         console.remark(f"{scenario.name}: proven in {len(enclosure.starts)} pieces of the start")
     return enclosure
@@ -166,21 +168,20 @@ def _references(options: argparse.Namespace) -> Ended:
     """Check the references of all models with a prover."""
     check_writable(options.report)
     found: dict[str, ProvenReference] = {}
-    everything, rows = {}, []
+    rows, checked = [], 0
     for name, program in enclosures.provers().items():
         folder = project.model(name)
         files = [x for x in project.scenario_files().values() if x.parents[1] == folder]
         table = console.PrintedTable("reference", [x.stem for x in files], COLUMNS)
         with Fmu(project.built(folder, ".fmu")) as fmu:
-            proofs = {}
             for scenario in [scenarios.load(path, fmu.model) for path in files]:
-                enclosure = proofs[scenario] = _enclosure(program, scenario, {})
+                enclosure = _enclosure(program, scenario, check=options.check)
                 good = found[scenario.name] = _reference(fmu, scenario, enclosure)
                 cells = [str(good.values), str(good.nearest), rounded_up(good.radius, 1)]
                 table.row(scenario.name, cells, verdict(good.passed))
                 rows.append((scenario.name, *cells, verdict(good.passed)))
-        if options.check:
-            everything |= _checked(program, proofs)
+                checked += enclosure.checked
+    everything = _checked(checked) if options.check else {}
     console.remark(
         "nearest doubles: values, of all columns, that are proven to be the doubles nearest to the "
         "exact ones; interval: radius of the widest one that contains an exact value"
@@ -196,12 +197,7 @@ def _references(options: argparse.Namespace) -> Ended:
     return Ended(0, f"proven: {counted(found, 'reference')}", document, page=page)
 
 
-def _checked(program: Prover, proofs: Mapping[Scenario, Enclosure]) -> dict[str, dict[str, int]]:
-    """Check the proofs of scenarios; prints how much is confirmed."""
-    steps = 0
-    for scenario, enclosure in proofs.items():
-        ahead = len(enclosure.starts) * (len(enclosure.times) - 1)
-        with Progress(f"{scenario.name}, check", ahead) as progress:
-            steps += program.check(scenario, enclosure, progress)
+def _checked(steps: int) -> dict[str, dict[str, int]]:
+    """Print how many steps are confirmed."""
     print(f"checked: {steps} steps confirmed")
     return {"checked": {"steps": steps}}

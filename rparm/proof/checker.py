@@ -1,40 +1,56 @@
-"""Checks every claim of a certificate by itself, in arb's intervals.
+"""Checks every step of a proof by another theorem, which README.md has.
 
-The certificate says for each step of `prove` where motions are over the step, and in what set they
-are at its end. Both are derived here again from what is claimed of the step before, so that the
-whole is a proof if no claim is wrong, whatever `prove` calculated and how. README.md has the
-theorems. Neither arithmetic nor recurrences are shared: series are flint's, by Picard's iteration,
-and derivatives solve the linear equation along a motion.
+The prover solves the equations. Nothing is solved here: the polynomials that it found are put into
+the equations, and by how much they fail bounds how far motions are from them. Series are flint's.
 """
 
+import operator
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import reduce
-from operator import add, mul, sub, truediv
 from typing import Any
 
-import flint
-from flint import arb, arb_mat, arb_series
+from flint import arb, arb_mat, arb_poly, arb_series
+
+from rparm.proof.problem import Problem, Start
+from rparm.proof.prover import States, Step, precision
 
 BITS = 192
-UNDERFLOW = 2.0**-800  # what is 0, but for underflow
+PARTS = 16  # of a step, in which derivatives are inverted
+TINY = arb(2) ** -2000  # so that what must be inside something has room
+UNIT, WHOLE = arb(0, 1), arb(0.5, 0.5)
 Series = Any  # arb_series, or arb of what rests
-ARITHMETIC = {"+": add, "-": sub, "*": mul, "/": truediv}
-FUNCTIONS: dict[str, Callable[[Series], Series]] = {
-    "sin": lambda x: x.sin(), "cos": lambda x: x.cos(), "exp": lambda x: x.exp(),
-    "log": lambda x: x.log(), "sqrt": lambda x: x.sqrt(), "atan": lambda x: x.atan(),
-    "tanh": lambda x: x.tanh(), "negative": lambda x: -x,
+
+
+def _exponential(x: Series) -> Series:
+    """e^x, of series by their first number: flint's own are wide where that is."""
+    return x.exp() if isinstance(x, arb) else x[0].exp() * (x - x[0]).exp()
+
+
+def _sqrt(x: Series) -> Series:
+    """By log x, whose slope is x' / x."""
+    if isinstance(x, arb):
+        return x.sqrt()
+    return x[0].sqrt() * ((x.derivative() / x).integral() / 2).exp()
+
+
+def _tanh(x: Series) -> Series:
+    return x.tanh() if isinstance(x, arb) else 1 - 2 / (_exponential(2 * x) + 1)
+
+
+OPERATIONS: dict[str, Callable[..., Series]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
+    "negative": operator.neg, "sin": lambda x: x.sin(), "cos": lambda x: x.cos(),
+    "exp": _exponential, "log": lambda x: x.log(), "atan": lambda x: x.atan(), "sqrt": _sqrt,
+    "tanh": _tanh,
 }  # fmt: skip
-INTEGRATED = ("sqrt", "tanh")  # of series, by their slopes: flint's would be far too wide
-# of the value, by each argument
+# of the value z, by each argument
 SLOPES: dict[str, Callable[..., tuple[Series, ...]]] = {
-    "sin": lambda x, z: (x.cos(),), "cos": lambda x, z: (-x.sin(),), "exp": lambda x, z: (z,),
-    "log": lambda x, z: (1 / x,), "sqrt": lambda x, z: (1 / (2 * z),),
-    "atan": lambda x, z: (1 / (1 + x * x),), "tanh": lambda x, z: (1 - z * z,),
-    "negative": lambda x, z: (arb(-1),), "+": lambda x, y, z: (arb(1), arb(1)),
-    "-": lambda x, y, z: (arb(1), arb(-1)), "*": lambda x, y, z: (y, x),
-    "/": lambda x, y, z: (1 / y, -z / y),
+    "+": lambda x, y, z: (arb(1), arb(1)), "-": lambda x, y, z: (arb(1), arb(-1)),
+    "*": lambda x, y, z: (y, x), "/": lambda x, y, z: (1 / y, -z / y),
+    "negative": lambda x, z: (arb(-1),), "sin": lambda x, z: (x.cos(),),
+    "cos": lambda x, z: (-x.sin(),), "exp": lambda x, z: (z,), "log": lambda x, z: (1 / x,),
+    "sqrt": lambda x, z: (1 / (2 * z),), "atan": lambda x, z: (1 / (1 + x * x),),
+    "tanh": lambda x, z: (1 - z * z,),
 }  # fmt: skip
 
 
@@ -42,356 +58,264 @@ class WrongClaim(Exception):
     """A claim that does not hold, or that cannot be confirmed."""
 
 
-# ---- The problem ---------------------------------------------------------------------------------
-class Model:
-    """The operations of a problem."""
+class Checker:
+    """Checks the steps of one proof in their order.
 
-    def __init__(self, lines: Iterator[list[str]]) -> None:
-        counts = [int(word) for word in next(lines)[1:]]
-        self.count, self.of_rates, self.of_series, self.states, self.inputs, *_ = counts
-        self.nodes = [next(lines) for _ in range(self.count)]
-        self.rates, self.outputs, guards, self.starts = (
-            [int(word) for word in next(lines)[1:]] for _ in range(4)
-        )
-        half = len(guards) // 2
-        self.guards = list(zip(guards[:half], guards[half:], strict=True))
+    Attributes
+    ----------
+    steps : int
+        How many are confirmed.
+    """
 
-    def values(
-        self,
-        states: Sequence[Series],
-        inputs: Sequence[arb],
-        time: Series,
-        count: int,
-        before: Sequence[Series] = (),
+    def __init__(self, problem: Problem, start: Start) -> None:
+        self.problem, self.steps, n = problem, 0, len(start)
+        with precision(BITS):
+            none = [arb(0)] * n, [arb(0)] * len(problem.inputs), arb(problem.scenario.times[0])
+            values = self._values(*none, len(problem.nodes))
+            known = [arb(value) for value, _ in start.values()]
+            for i, name in enumerate(start):
+                if name in problem.starts and start[name][0] == problem.known[name]:
+                    known[i] = values[problem.starts[name]]
+            one = arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+            centre = _column([x.mid() for x in known])
+            off = _column([UNIT * radius for _, radius in start.values()])
+            self.set = States(centre, one, _column(known) - centre, one, off)
+
+    # ---- The equations -----------------------------------------------------------------------
+
+    def _values(
+        self, states: Sequence[Series], inputs: Sequence[arb], time: Series, count: int
     ) -> list[Series]:
-        """Return the values of the first nodes; of series, `before` are those of an order less."""
-        found: list[Series] = []
-        for k, (op, *words) in enumerate(self.nodes[:count]):
-            match op:
-                case "number":
-                    value = arb(float.fromhex(words[0]))
-                case "state":
-                    value = states[int(words[0])]
-                case "input":
-                    value = inputs[int(words[0])]
-                case "time":
-                    value = time
-                case _ if op in INTEGRATED and isinstance(x := found[int(words[0])], arb_series):
-                    value = arb_series([FUNCTIONS[op](x[0])])
-                    if before:
-                        (slope,) = SLOPES[op](x, before[k])
-                        value += (slope * x.derivative()).integral()
-                case _ if op in FUNCTIONS:
-                    value = FUNCTIONS[op](found[int(words[0])])
-                case _:
-                    value = ARITHMETIC[op](*(found[int(word)] for word in words))
-            found.append(value)
+        """Return the values of the first nodes, of numbers or of series."""
+        found = [*states]
+        for node in self.problem.nodes[len(found) : count]:
+            if node.op == "number":
+                found.append(node.number)
+            elif node.op in ("input", "time"):
+                found.append(inputs[node.arguments[0]] if node.op == "input" else time)
+            else:
+                found.append(OPERATIONS[node.op](*(found[j] for j in node.arguments)))
         return found
 
-    def derivatives(self, found: Sequence[Series], state: int) -> list[Series]:
-        """Return the derivatives of the rates by a state, where the nodes have these values."""
-        slopes: list[Series] = []  # None: 0
-        for k, (op, *words) in enumerate(self.nodes[: self.of_rates]):
-            terms = [arb(1)] if op == "state" and int(words[0]) == state else []
-            if op in SLOPES:
-                given = [int(word) for word in words[: 1 if op in FUNCTIONS else 2]]
-                if any(slopes[i] is not None for i in given):
-                    by = SLOPES[op](*(found[i] for i in given), found[k])
-                    pairs = zip(by, (slopes[i] for i in given), strict=True)
-                    terms = [slope * d for slope, d in pairs if d is not None]
-            slopes.append(sum(terms[1:], terms[0]) if terms else None)
-        return [arb(0) if slopes[node] is None else slopes[node] for node in self.rates]
+    def _rates(self, states: Sequence[Series], inputs: Sequence[arb], time: Series) -> list[Series]:
+        values = self._values(states, inputs, time, self.problem.of_rates)
+        return [values[node] for node in self.problem.rates]
+
+    def _derivatives(
+        self, states: Sequence[Series], inputs: Sequence[arb], time: Series
+    ) -> list[list[Series]]:
+        """Return those of the rates (rows) by the states."""
+        problem, n = self.problem, len(states)
+        values = self._values(states, inputs, time, problem.of_rates)
+        columns = []
+        for state in range(n):
+            slopes: list[Series] = [arb(int(i == state)) for i in range(n)]
+            for node, z in zip(problem.nodes[n : problem.of_rates], values[n:], strict=True):
+                slope = arb(0)
+                # what is 0 needs no slope
+                if node.op in SLOPES and any(not _is_zero(slopes[j]) for j in node.arguments):
+                    by = SLOPES[node.op](*(values[j] for j in node.arguments), z)
+                    slope = _sum(x * slopes[j] for x, j in zip(by, node.arguments, strict=True))
+                slopes.append(slope)
+            columns.append([slopes[node] for node in problem.rates])
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    # ---- Steps -------------------------------------------------------------------------------
+
+    def step(
+        self, step: Step, begin: arb, length: arb, inputs: Sequence[arb], guarded: bool = True
+    ) -> None:
+        """Check that motions from the set are in the next one at the end, without an event."""
+        with precision(BITS):
+            tube = _Tube(self, step, begin, length, inputs)
+            if guarded:
+                self._guard(tube, inputs)
+            self._moved(step.after, tube)
+        self.set = step.after
+        self.steps += 1
+
+    def _guard(self, tube: "_Tube", inputs: Sequence[arb]) -> None:
+        states, time = tube.states(), tube.begin + tube.length * WHOLE
+        count = self.problem.of_series
+        at = self._values(_hull(self.set).entries(), inputs, tube.begin, count)
+        rates = self._rates(states, inputs, time)
+        moving = [arb_series([x, rate]) for x, rate in zip(states, rates, strict=True)]
+        values = self._values(moving, inputs, arb_series([time, 1]), count)
+        for node, is_positive, name in self.problem.guards:
+            x = arb_series([1]) * values[node]
+            decides = x[1] if at[node].is_zero() else x[0]  # from 0 on the slope
+            if not (decides > 0 if is_positive else decides < 0):
+                raise WrongClaim(f"no {name}")
+
+    def _moved(self, after: States, tube: "_Tube") -> None:
+        before, n = self.set, len(self.problem.states)
+        exact = *after.centre.entries(), *after.frame.entries(), *after.spread.entries()
+        if not all(x.is_exact() for x in exact):
+            raise WrongClaim("a centre or side that is not exact")
+        try:
+            inverse = after.frame.inv()
+        except ZeroDivisionError:
+            raise WrongClaim("a frame without an inverse") from None
+        end, flow, off = tube.end(inverse)
+        found = inverse * (end - after.centre) + off + (flow * before.frame) * before.y
+        found += (flow * before.spread - inverse * after.spread) * before.s
+        for i in range(n):
+            if not after.y[i, 0].contains(found[i, 0]):
+                raise WrongClaim(f"radius {i} of the set")
+            if not after.s[i, 0].contains(before.s[i, 0]):
+                raise WrongClaim(f"start {i} of the set")
+
+    def crossing(
+        self, step: Step, begin: arb, length: arb, inputs: Sequence[arb], guard: int
+    ) -> None:
+        """Check that motions, if they went on without an event, would pass it within the step."""
+        self.step(step, begin, length, inputs, guarded=False)
+        node, is_positive, name = self.problem.guards[guard]
+        with precision(BITS):
+            hull = _hull(self.set).entries()
+            x = self._values(hull, inputs, begin + length, node + 1)[node]
+        if not (x < 0 if is_positive else x > 0):
+            raise WrongClaim(f"{name} within the step")
+
+    def point(self, balls: Sequence[Sequence[float]], inputs: Sequence[arb], time: float) -> None:
+        """Check that balls (high, low, radius) contain the set and the outputs there."""
+        with precision(BITS):
+            hull = _hull(self.set).entries()
+            values = self._values(hull, inputs, arb(time), len(self.problem.nodes))
+            nodes = self.problem.outputs[: len(balls)]
+            for (high, low, radius), node in zip(balls, nodes, strict=True):
+                if not arb(0, radius).contains(values[node] - arb(high) - arb(low)):
+                    raise WrongClaim(f"value {node} at {time!r} s")
 
 
-@dataclass
-class Set:
-    """States centre + sum of c_j side_j, |c_j| <= radii_j; the first sides are a frame."""
+class _Tube:
+    """Polynomials p and Y over a step; motions are in p(t) + Y(t) (w + [-off, off])."""
 
-    centre: list[arb]
-    sides: list[list[arb]]
-    radii: list[arb]
+    def __init__(
+        self, checker: Checker, step: Step, begin: arb, length: arb, inputs: Sequence[arb]
+    ) -> None:
+        self.checker, self.begin, self.length, self.inputs = checker, begin, length, inputs
+        before, n = checker.set, len(step.motion)
+        self.p = [
+            arb_poly([x, *row[1:]])
+            for x, row in zip(before.centre.entries(), step.motion, strict=True)
+        ]
+        self.flow = [
+            [arb_poly([int(i == j), *(y[i, j] for y in step.flow[1:])]) for j in range(n)]
+            for i in range(n)
+        ]
+        self.orders = len(step.motion[0]) - 1, len(step.flow) - 1
+        reach = [x.abs_upper() for x in (_hull(before) - before.centre).entries()]
+        self.inverses = [*self._inverses()]
+        defect, off = self._defect(), [arb(0)] * n
+        for factor in (1, 1, 2):
+            more = [factor * x + TINY for x in off]
+            self.room = [x + y for x, y in zip(reach, more, strict=True)]
+            self.fails = self._deviation(defect)
+            found = [self._off(0, 1, inverse).entries() for inverse in self.inverses]
+            off = [reduce(arb.max, column) for column in zip(*found, strict=True)]
+        if not all(x < y for x, y in zip(off, more, strict=True)):
+            raise WrongClaim("a motion that may be anywhere")
 
-    def reach(self) -> list[arb]:
-        """Return how far each state is from the centre at most."""
-        rows = zip(*self.sides, strict=True)
-        return [_sum(abs(x) * r for x, r in zip(row, self.radii, strict=True)) for row in rows]
+    def _off(self, since: float, until: float, by: arb_mat) -> arb_mat:
+        """Bound the integral of |by (f(x) - p' - Y' w)| from one part of the step to another."""
+        balls = []
+        for sizes in self.fails:
+            parts = ((arb(until) ** k - arb(since) ** k) / k for k in range(1, len(sizes) + 1))
+            balls.append(UNIT * _sum(map(operator.mul, sizes, parts)).abs_upper())
+        return _column([x.abs_upper() for x in (by * _column(balls)).entries()])
 
-    def hull(self) -> list[arb]:
-        """Return intervals that contain it."""
-        return [x + around(r) for x, r in zip(self.centre, self.reach(), strict=True)]
+    def _at(self, poly: arb_poly, orders: int, over: bool) -> arb_series:
+        """Its coefficients from the begin, or from any time of the step."""
+        if over:
+            poly = poly(arb_poly([WHOLE, 1]))
+        return arb_series(poly.coeffs()[: orders + 1])
+
+    def _around(self, orders: int, over: bool) -> list[arb_series]:
+        """Return the series of states in the tube."""
+        room = [UNIT * x.abs_upper() for x in self.room]
+        return [
+            self._at(p, orders, over)
+            + _sum(self._at(y, orders, over) * w for y, w in zip(row, room, strict=True))
+            for p, row in zip(self.p, self.flow, strict=True)
+        ]
+
+    def _time(self, over: bool) -> arb_series:
+        return arb_series([self.begin + self.length * WHOLE if over else self.begin, self.length])
+
+    def states(self) -> list[arb]:
+        """Return where motions are over the whole step."""
+        return [x[0] for x in self._around(0, over=True)]
+
+    def _defect(self) -> list[list[arb]]:
+        """Bound the coefficients of f(p) - p': Taylor's theorem with its remainder."""
+        orders = self.orders[0]
+        found = []
+        with precision(BITS, orders + 1):
+            for over in (False, True):
+                states = [self._at(p, orders, over) for p in self.p]
+                rates = self.checker._rates(states, self.inputs, self._time(over))
+                found.append([
+                    arb_series([1]) * rate * self.length - self._at(p.derivative(), orders, over)
+                    for rate, p in zip(rates, self.p, strict=True)
+                ])  # fmt: skip
+        return [_sizes(x, y, orders) for x, y in zip(*found, strict=True)]
+
+    def _deviation(self, defect: list[list[arb]]) -> list[list[arb]]:
+        """Add bounds of (Df Y - Y') w in the tube."""
+        orders, n = self.orders[1], len(self.p)
+        added = [[*sizes] for sizes in defect]
+        found = []
+        with precision(BITS, orders + 1):
+            for over in (False, True):
+                states = self._around(orders, over)
+                slopes = self.checker._derivatives(states, self.inputs, self._time(over))
+                flow = [[self._at(y, orders, over) for y in row] for row in self.flow]
+                found.append([
+                    _sum(slopes[i][k] * self.length * flow[k][j] for k in range(n)
+                         if not _is_zero(slopes[i][k]))
+                    - self._at(self.flow[i][j].derivative(), orders, over)
+                    for i in range(n) for j in range(n)
+                ])  # fmt: skip
+        for ij, (x, y) in enumerate(zip(*found, strict=True)):
+            for k, size in enumerate(_sizes(x, y, orders)):
+                added[ij // n][k] += size * self.room[ij % n]
+        return added
+
+    def _inverses(self) -> Iterator[arb_mat]:
+        """Yield Y^-1 in each part of the step."""
+        for k in range(PARTS):
+            middle, part = arb_poly([arb(k + 0.5) / PARTS, 1]), UNIT / (2 * PARTS)
+            try:
+                yield arb_mat([[y(middle)(part) for y in row] for row in self.flow]).inv()
+            except ZeroDivisionError:
+                raise WrongClaim("derivatives without an inverse") from None
+
+    def end(self, inverse: arb_mat) -> tuple[arb_mat, arb_mat, arb_mat]:
+        """Return p and `inverse` Y at the end, and what is off there, times `inverse`."""
+        flow = inverse * arb_mat([[y(arb(1)) for y in row] for row in self.flow])
+        off = _column([arb(0)] * len(self.p))
+        for k, part in enumerate(self.inverses):
+            off += self._off(k / PARTS, (k + 1) / PARTS, flow * part)
+        return _column([p(arb(1)) for p in self.p]), flow, off * UNIT
 
 
-@dataclass
-class Step:
-    """The claims of one step."""
-
-    order: int
-    length: float  # s; 0: up to the communication point
-    box: list[tuple[float, ...]]
-    after: Set
+def _sizes(begin: arb_series, over: arb_series, orders: int) -> list[arb]:
+    return [begin[k].abs_upper() for k in range(orders)] + [over[orders].abs_upper()]
 
 
-def around(radius: arb) -> arb:
-    """All numbers up to a radius."""
-    return arb(0, 1) * radius.abs_upper()
+def _hull(of: States) -> arb_mat:
+    """Return intervals that contain a set."""
+    return of.centre + of.frame * of.y + of.spread * of.s
 
 
-def _sum(terms: Iterable[arb]) -> arb:
+def _sum(terms: Iterable[Series]) -> Series:
     return sum(terms, arb(0))
 
 
-def _numbers(words: Iterable[str]) -> list[float]:
-    try:
-        found = [float.fromhex(word) for word in words]
-    except (ValueError, OverflowError) as error:
-        raise WrongClaim(f"no number: {error}") from error
-    if not all(abs(number) < float("inf") for number in found):
-        raise WrongClaim("a number is not finite")
-    return found
+def _column(values: Sequence[arb]) -> arb_mat:
+    return arb_mat(len(values), 1, [*values])
 
 
-def _balls(words: Sequence[str]) -> list[tuple[float, ...]]:
-    numbers = _numbers(words)
-    found = [tuple(numbers[i : i + 3]) for i in range(0, len(numbers), 3)]
-    if any(len(ball) != 3 or ball[2] < 0 for ball in found):
-        raise WrongClaim("a radius is negative or missing")
-    return found
-
-
-def distance(x: arb, ball: tuple[float, ...]) -> arb:
-    """Bound how far an interval is from the middle of a ball."""
-    return (x - arb(ball[0]) - arb(ball[1])).abs_upper()
-
-
-# ---- Series --------------------------------------------------------------------------------------
-@contextmanager
-def _orders(count: int) -> Iterator[None]:
-    before, flint.ctx.cap = flint.ctx.cap, count
-    yield
-    flint.ctx.cap = before
-
-
-@dataclass
-class Motion:
-    """Series of motions from these states, in the time since the begin over the length."""
-
-    model: Model
-    start: list[arb]
-    inputs: list[arb]
-    begin: arb  # s
-    length: arb  # s
-    values: list[Series] = field(default_factory=list)  # of all nodes, by the round before
-
-    def states(self, order: int) -> list[arb_series]:
-        """Return their coefficients by Picard's iteration: each round gets an order right."""
-        found = [arb_series([x]) for x in self.start]
-        self.values = []
-        for k in range(1, order + 1):
-            with _orders(k + 1):
-                self.values = self._values(found)
-                found = [
-                    (arb_series([1]) * self.values[rate] * self.length).integral() + x
-                    for rate, x in zip(self.model.rates, self.start, strict=True)
-                ]
-        return found
-
-    def _values(self, states: Sequence[arb_series]) -> list[Series]:
-        time = arb_series([self.begin, self.length])
-        count = self.model.of_series
-        return self.model.values(states, self.inputs, time, count, self.values)
-
-    def jacobian(self, states: Sequence[arb_series], order: int) -> arb_mat:
-        """Return the derivatives of the polynomials' values at the end: Y' = J Y, Y(0) = 1."""
-        n = self.model.states
-        with _orders(order):
-            values = self._values(states)
-            columns = [self.model.derivatives(values, j) for j in range(n)]
-        by_time = [[arb_series([1]) * x * self.length for x in column] for column in columns]
-        linear = [
-            arb_mat(n, n, [by_time[j][i][k] for i in range(n) for j in range(n)])
-            for k in range(order)
-        ]
-        found = [arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])]
-        for k in range(order):
-            terms = [linear[j] * found[k - j] for j in range(k + 1)]
-            found.append(reduce(arb_mat.__add__, terms) * (arb(1) / (k + 1)))
-        return reduce(arb_mat.__add__, found)
-
-
-# ---- Checks --------------------------------------------------------------------------------------
-class Checker:
-    """Checks the steps of one certificate in their order."""
-
-    def __init__(self, model: Model, start: list[str]) -> None:
-        time, *radii = _numbers(start)
-        n, self.model, self.time, self.inputs = model.states, model, time, [arb(0)] * model.inputs
-        values = model.values([arb(0)] * n, self.inputs, arb(time), model.count)
-        known = [values[node] for node in model.starts]
-        centre = [x.mid() for x in known]
-        roundings = [x.rad() for x in known]
-        frame = [[arb(int(i == j)) for i in range(n)] for j in range(n)]
-        uncertain = [arb(r) for r in radii] if any(radii) else []
-        self.set = Set(centre, frame * (2 if uncertain else 1), roundings + uncertain)
-
-    def step(self, step: Step, begin: arb, length: arb) -> None:
-        """Check a step; its end is then the set."""
-        if step.order < 1 or not length > 0:
-            raise WrongClaim("order or length")
-        model, n = self.model, self.model.states
-        hull = Motion(model, self.set.hull(), self.inputs, begin, length)
-        series = hull.states(step.order)
-        remainder = self._remainder(step, begin, length)
-        for i, (x, r) in enumerate(zip(series, remainder, strict=True)):
-            half = x[1] / 2
-            sizes = [half, *(x[k] for k in range(2, step.order + 1)), r]
-            reached = x[0] + half + around(_sum(y.abs_upper() for y in sizes))
-            if not distance(reached, step.box[i]) < step.box[i][2]:
-                raise WrongClaim(f"box of state {i}")
-        centre = Motion(model, self.set.centre, self.inputs, begin, length)
-        ends = [_sum(x.coeffs()) for x in centre.states(step.order)]
-        slopes, after = hull.jacobian(series, step.order), step.after
-        frame, before = (
-            arb_mat([[side[i] for side in of.sides[:n]] for i in range(n)])
-            for of in (after, self.set)
-        )
-        try:
-            inverse = frame.inv()
-        except ZeroDivisionError:
-            raise WrongClaim("the frame has no inverse") from None
-        rest = [x + r - c for x, r, c in zip(ends, remainder, after.centre, strict=True)]
-        parts = [inverse * arb_mat([[x] for x in rest])]
-        parts += [_columns(inverse * slopes * before, self.set.radii[:n])]
-        if (uncertain := self.set.radii[n:]) != []:
-            old, new = (
-                arb_mat([[side[i] for side in of.sides[n:]] for i in range(n)])
-                for of in (self.set, after)
-            )
-            parts += [_columns(inverse * (slopes * old - new), uncertain)]
-        for i in range(n):
-            needed = _sum(x.abs_upper() for part in parts for x in part.tolist()[i])
-            if not needed <= after.radii[i]:
-                raise WrongClaim(f"radius {i} of the set")
-        self.set = Set(after.centre, after.sides, after.radii[:n] + uncertain)
-
-    def _remainder(self, step: Step, begin: arb, length: arb) -> list[arb]:
-        """Return the coefficients after the last order over the box, where no event is."""
-        box = [arb(high) + arb(low) + around(arb(r)) for high, low, r in step.box]
-        whole = begin + length * arb(0.5, 0.5)
-        over = Motion(self.model, box, self.inputs, whole, length)
-        found = over.states(step.order + 1)
-        at = self.model.values(self.set.hull(), self.inputs, begin, self.model.of_series)
-        for i, (node, is_positive) in enumerate(self.model.guards):
-            x = arb_series([1]) * over.values[node]
-            decides = x[1] if at[node].abs_upper() <= UNDERFLOW else x[0]  # from 0 on the slope
-            if not (decides > 0 if is_positive else decides < 0):
-                raise WrongClaim(f"guard {i}")
-        return [x[step.order + 1] for x in found]
-
-    def point(self, words: Sequence[str], time: float) -> None:
-        """Check that the printed balls contain the set, and the outputs of all states in them."""
-        balls, model = _balls(words), self.model
-        if len(balls) != len(model.outputs):
-            raise WrongClaim(f"{len(balls)} balls for {len(model.outputs)} variables")
-        states = [arb(high) + arb(low) + around(arb(r)) for high, low, r in balls[: model.states]]
-        values = model.values(states, self.inputs, arb(time), model.count)
-        found = [*self.set.centre, *(values[node] for node in model.outputs[model.states :])]
-        reach = self.set.reach() + [arb(0)] * (len(found) - model.states)
-        for i, (ball, x, more) in enumerate(zip(balls, found, reach, strict=True)):
-            if not distance(x, ball) + more <= ball[2]:
-                raise WrongClaim(f"printed ball {i}")
-
-
-def _columns(matrix: arb_mat, radii: Sequence[arb]) -> arb_mat:
-    """Scale each column."""
-    return arb_mat([[x * r for x, r in zip(row, radii, strict=True)] for row in matrix.tolist()])
-
-
-# ---- Certificates --------------------------------------------------------------------------------
-def _claims(lines: Iterable[str], n: int, sides: int) -> Iterator[Step | float]:
-    """Yield the steps, and after each communication step the time of its end (s)."""
-    rows = map(str.split, lines)
-
-    def take(name: str, count: int) -> list[str]:
-        found, *words = next(rows, [""])
-        if found != name or len(words) != count:
-            raise WrongClaim(f"expected {name} of {count} numbers, got {found!r}, {len(words)}")
-        return words
-
-    for name, *words in rows:
-        if name == "point":
-            yield _numbers(words)[0]
-            continue
-        box, centre = _balls(take("box", 3 * n)), _balls(take("centre", 3 * n))
-        vectors = [[arb(x) for x in _numbers(take("side", n))] for _ in range(sides)]
-        radii = [arb(x) for x in _numbers(take("radii", sides))]
-        after = Set([arb(high) + arb(low) for high, low, _ in centre], vectors, radii)
-        yield Step(int(words[0]), _numbers(words[1:])[0], box, after)
-
-
-def check(
-    problem: Iterable[str],
-    points: Iterable[str],
-    certificate: Iterable[str],
-    progress: Callable[[int], object] | None = None,
-) -> int:
-    """Check all claims, and return how many steps there are; WrongClaim if one does not hold.
-
-    `problem` went to `prove`, which printed `points` and wrote `certificate`, in lines. `progress`
-    is called with 1 after each communication step.
-    """
-    before, flint.ctx.prec = flint.ctx.prec, BITS
-    try:
-        return _check(map(str.split, problem), points, certificate, progress)
-    finally:
-        flint.ctx.prec = before
-
-
-def _check(
-    problem: Iterator[list[str]],
-    points: Iterable[str],
-    certificate: Iterable[str],
-    progress: Callable[[int], object] | None,
-) -> int:
-    model = Model(problem)
-    checker = Checker(model, next(problem)[1:])
-    printed = map(str.split, points)
-    claims = _claims(certificate, model.states, len(checker.set.sides))
-    begin, count = checker.time, 0
-    for index, (_, *numbers) in enumerate(problem):
-        end, *inputs = _numbers(numbers)
-        checker.inputs = [arb(x) for x in inputs]
-        if index == 0:
-            checker.point(_printed(printed, "point", begin), begin)
-        at, is_last = arb(begin), False
-        for claim in claims:
-            if not isinstance(claim, Step):
-                if claim != end or not is_last:
-                    raise WrongClaim(f"communication point {index + 1}")
-                break
-            is_last = claim.length == 0
-            length = arb(end) - at if is_last else arb(claim.length)
-            try:
-                checker.step(claim, at, length)
-            except WrongClaim as error:
-                raise WrongClaim(f"step to {end!r} s: {error}") from error
-            at, count = at + length, count + 1
-        else:  # no more: up to there it must hold
-            (name, time, *_), *more = [*printed] or [["", ""]]
-            if more or name != "stopped" or not arb(float.fromhex(time)) <= at:
-                raise WrongClaim("steps are missing at the end")
-            return count
-        checker.point(_printed(printed, "point", end), end)
-        begin = end
-        if progress is not None:
-            progress(1)
-    if [*printed, *claims]:
-        raise WrongClaim("there is more at the end")
-    return count
-
-
-def _printed(printed: Iterator[list[str]], name: str, time: float) -> list[str]:
-    """Return the next line's balls."""
-    found, *words = next(printed, [""])
-    if found != name or _numbers(words[:1]) != [time]:
-        raise WrongClaim(f"{time!r} s: expected a {name} there")
-    return words[1:]
+def _is_zero(x: Series) -> bool:
+    return isinstance(x, arb) and x.is_zero()

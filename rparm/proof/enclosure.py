@@ -1,35 +1,34 @@
-"""Intervals that contain the exact motion of a scenario, from the program that proves them.
-
-README.md has the theorems, and what the program reads and writes.
-"""
+"""Intervals that contain the exact motion of a scenario; README.md has the theorems."""
 
 import json
 import math
 import subprocess
 import sys
-import tempfile
-import threading
+import time
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from flint import arb
 
 from rparm import building, project
 from rparm.errors import UserError, one_line
 from rparm.files import is_file
 from rparm.interruption import temporary_folder
+from rparm.proof.checker import Checker, WrongClaim
 from rparm.proof.problem import Problem, Start
+from rparm.proof.prover import BITS, Obstacle, Stepper, precision, start_of, upper
 from rparm.runs import scenario as scenarios
 from rparm.runs.scenario import Scenario
 
-STOPPED = 1  # exit code: the proof could not go on
 HALVINGS = 6  # of starts that are too broad to be proven at once
 ASSUMED = "the equations of motion, exact parameters and inputs as given, and IEEE doubles"
 Progress = Callable[[int], object]  # is called with 1 after each communication step
+Ball = tuple[float, float, float]  # |exact - (high + low)| <= radius
 
 
 @dataclass(frozen=True)
@@ -38,12 +37,15 @@ class Stop:
 
     time: float  # s, up to which it holds
     reason: str
-    is_event: bool  # the model's first event comes next
+    is_event: bool  # the model's first event may come next
+    by: float | None = None  # s, when the event has come, if that is proven
 
     def __str__(self) -> str:
-        if self.is_event:
-            return f"proven up to the first event, at {self.time!r} s: {self.reason}"
-        return f"the proof holds up to {self.time!r} s, no further: {self.reason}"
+        if not self.is_event:
+            return f"the proof holds up to {self.time!r} s, no further: {self.reason}"
+        if self.by is None:
+            return f"proven up to {self.time!r} s, where the first event may be: {self.reason}"
+        return f"proven up to the first event, from {self.time!r} to {self.by!r} s: {self.reason}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,7 @@ class Enclosure:
     radius: np.ndarray
     stopped: Stop | None
     starts: tuple[Start, ...]  # pieces of the start that were proven one by one
+    checked: int = 0  # steps that the checker has confirmed
 
     def of(self, names: Sequence[str]) -> "Enclosure":
         """Return the intervals of these variables."""
@@ -84,18 +87,23 @@ class Prover:
         scenario: Scenario,
         within: Mapping[str, float] | None = None,
         progress: Progress | None = None,
-        seconds: float = threading.TIMEOUT_MAX,
+        seconds: float = math.inf,
+        check: bool = False,
     ) -> Enclosure:
         """Enclose all motions of a scenario at its communication points, up to the first event.
 
         The start of states may be off by `within`; if too broad for a proof, it is halved, and its
-        halves, too. UserError if a proof takes over `seconds`.
+        halves, too. UserError if a proof takes over `seconds`, or if `check` confirms a step not.
         """
         off, problem = within or {}, Problem(self.model, scenario, self.with_outputs)
         start = {n: (float(problem.known[n]), off.get(n, 0.0)) for n in self.states}
 
         def pieces(start: Start, halvings: int) -> list[Enclosure]:
-            found = _proven(problem, start, progress, seconds)
+            proof = Proof(problem, start, progress, time.monotonic() + seconds)
+            try:
+                found = proof.enclosure(check)
+            except WrongClaim as error:
+                raise UserError(f"{scenario.path}: not confirmed: {error}") from error
             is_too_broad = found.stopped is not None and not found.stopped.is_event
             if not (is_too_broad and halvings and any(r for _, r in start.values())):
                 return [found]
@@ -109,81 +117,82 @@ class Prover:
 
         return reduce(hull, pieces(start, HALVINGS))
 
-    def check(
-        self, scenario: Scenario, enclosure: Enclosure, progress: Progress | None = None
-    ) -> int:
-        """Prove again and check all claims; count the steps. UserError for a wrong claim."""
-        try:
-            from rparm.proof import checker
-        except ModuleNotFoundError as error:
-            if error.name != "flint":
-                raise
-            way_out = project.how_to_install("control")
-            raise UserError(f"--check needs python-flint, {way_out} installs it") from error
-        problem, steps, found = Problem(self.model, scenario, self.with_outputs), 0, []
-        for start in enclosure.starts:
-            with temporary_folder() as folder:
-                certificate = folder / "certificate"
-                asked = [*problem.text(start)]
-                question = {"input": "".join(asked), "capture_output": True, "encoding": "utf-8"}
-                command = [project.proof_program(), certificate]
-                points = subprocess.run(command, **question).stdout.splitlines()
-                try:
-                    with certificate.open(encoding="utf-8") as claims:
-                        steps += checker.check(asked, points, claims, progress)
-                except checker.WrongClaim as error:
-                    raise UserError(f"{scenario.path}: not confirmed: {error}") from error
-            found.append(_answer(problem, points, start))
-        again = reduce(hull, found)
-        for name in ("times", "high", "low", "radius"):
-            if not np.array_equal(getattr(again, name), getattr(enclosure, name)):
-                raise UserError(f"{scenario.path}: the proof is not confirmed: {name} differ")
-        return steps
+
+@dataclass
+class Proof:
+    """The proof from one start."""
+
+    problem: Problem
+    start: Start
+    progress: Progress | None = None
+    deadline: float = math.inf  # of time.monotonic()
+
+    def enclosure(self, check: bool = False) -> Enclosure:
+        """Return it; WrongClaim if a step should be checked and is not confirmed."""
+        with precision(BITS):
+            return self._enclosure(check)
+
+    def _enclosure(self, check: bool) -> Enclosure:
+        problem, times = self.problem, [float(t) for t in self.problem.scenario.times]
+        states = start_of(problem.start(self.start), [r for _, r in self.start.values()])
+        self.stepper = Stepper(problem, states, arb(times[0]))
+        self.checker = Checker(problem, self.start) if check else None
+        rows, stopped = [self._point(problem.held()[0], times[0])], None
+        for end, inputs in zip(times[1:], problem.held(), strict=True):
+            if time.monotonic() > self.deadline:
+                raise UserError(f"{problem.scenario.path}: the proof takes too long")
+            try:
+                self._to(end, inputs)
+            except Obstacle as obstacle:
+                stopped = self._stop(obstacle, end, inputs)
+                break
+            rows.append(self._point(inputs, end))
+            if self.progress is not None:
+                self.progress(1)
+        parts = np.moveaxis(np.array(rows), 2, 0)
+        checked = self.checker.steps if self.checker else 0
+        done = np.array(times[: len(rows)])
+        return Enclosure(done, problem.names, *parts, stopped, (self.start,), checked)
+
+    def _to(self, end: float, inputs: Sequence[arb]) -> None:
+        """Take, and check, all steps to a communication point."""
+        at = self.stepper.at
+        for step in self.stepper.advance(end, inputs):
+            if self.checker:
+                self.checker.step(step, at, step.length, inputs)
+                at += step.length
+        if self.checker and not at.contains(end):
+            raise WrongClaim(f"steps to {end!r} s")
+
+    def _point(self, inputs: Sequence[arb], at: float) -> list[Ball]:
+        """Return the states and outputs, with these inputs."""
+        problem, hull = self.problem, self.stepper.states.hull().entries()
+        values = problem.balls(hull, inputs, arb(at), len(problem.nodes))
+        found = [ball_of(values[node]) for node in problem.outputs]
+        if self.checker:
+            self.checker.point(found, inputs, at)
+        return found
+
+    def _stop(self, obstacle: Obstacle, end: float, inputs: Sequence[arb]) -> Stop:
+        """Return where the proof ends, and until when an event has come."""
+        at, by = self.stepper.at, None
+        is_event = obstacle.kind == "event"
+        step = self.stepper.crossing(obstacle.where, end, inputs) if is_event else None
+        if step is not None:
+            if self.checker:
+                self.checker.crossing(step, at, step.length, inputs, obstacle.where)
+            by = math.nextafter(float((at + step.length).upper()), math.inf)
+        holds = math.nextafter(float(at.lower()), -math.inf)
+        start = float(self.problem.scenario.times[0])
+        reason = self.problem.reason(obstacle.kind, obstacle.where)
+        return Stop(max(holds, start), reason, is_event, by)
 
 
-# ---- The program ---------------------------------------------------------------------------------
-def _proven(problem: Problem, start: Start, progress: Progress | None, seconds: float) -> Enclosure:
-    program = project.proof_program()
-    with tempfile.TemporaryFile("w+") as asked, tempfile.TemporaryFile("w+") as errors:
-        asked.writelines(problem.text(start))
-        asked.seek(0)
-        with subprocess.Popen(
-            [program], stdin=asked, stdout=subprocess.PIPE, stderr=errors, encoding="utf-8"
-        ) as process:
-            assert process.stdout is not None
-            watch = threading.Timer(seconds, process.kill)
-            watch.daemon = True
-            watch.start()
-            lines = list(_watched(process.stdout, progress))
-            watch.cancel()
-        if process.returncode not in (0, STOPPED):
-            errors.seek(0)
-            text = errors.read().strip() or f"exit code {process.returncode}"
-            raise UserError(f"{problem.scenario.path}: nothing can be proven: {text}")
-    return _answer(problem, lines, start)
-
-
-def _answer(problem: Problem, lines: Iterable[str], start: Start) -> Enclosure:
-    rows, times, stopped = [], [], None
-    for line in lines:
-        name, time, *words = line.split()
-        if name == "stopped":
-            obstacle, where = words
-            reason = problem.reason(obstacle, int(where))
-            stopped = Stop(float.fromhex(time), reason, obstacle == "event")
-        else:
-            times.append(float.fromhex(time))
-            rows.append([float.fromhex(number) for number in words])
-    parts = np.array(rows).reshape(len(rows), len(problem.names), 3)
-    high, low, radius = np.moveaxis(parts, 2, 0)
-    return Enclosure(np.array(times), problem.names, high, low, radius, stopped, (start,))
-
-
-def _watched(lines: Iterable[str], progress: Progress | None) -> Iterator[str]:
-    for number, line in enumerate(lines):
-        if number and progress is not None:
-            progress(1)
-        yield line
+def ball_of(x: arb) -> Ball:
+    """Return the midpoint as a sum of doubles, and a radius that is large enough."""
+    high = float(x.mid())
+    low = float(x.mid() - arb(high))
+    return high, low, upper(x - arb(high) - arb(low)) if x.is_finite() else math.inf
 
 
 # ---- Pieces of starts ----------------------------------------------------------------------------
@@ -209,8 +218,8 @@ def hull(one: Enclosure, other: Enclosure) -> Enclosure:
     # roundings of these sums are far below the last term
     room = 8 * np.spacing(np.maximum(np.abs(least), np.abs(greatest)))
     radius = (greatest - least) / 2 + room
-    starts = one.starts + other.starts
-    return Enclosure(one.times, one.names, middle, 0 * middle, radius, None, starts)
+    starts, checked = one.starts + other.starts, one.checked + other.checked
+    return Enclosure(one.times, one.names, middle, 0 * middle, radius, None, starts, checked)
 
 
 # ---- Models --------------------------------------------------------------------------------------

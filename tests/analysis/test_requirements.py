@@ -39,7 +39,7 @@ COMMANDS = {
     ),
     "control": (
         "rparm/commands/linearize.py", "rparm/linearization/*.py", "rparm/commands/identify.py",
-        "rparm/identification/*.py", "rparm/proof/checker.py",
+        "rparm/identification/*.py",
     ),
     "federation": ("rparm/commands/fed*.py", "rparm/federation/*.py"),
     "release": ("fmu/bill_of_materials.py", "fmu/built.py", "fmu/wheel.py", "playground/build.py"),
@@ -48,7 +48,7 @@ COMMANDS = {
 # what others use only where its packages are installed
 OPTIONAL = (
     "rparm/campaign/*.py", "rparm/federation/*.py", "rparm/identification/*.py",
-    "rparm/linearization/*.py", "rparm/fmi/compiled_*.py", "rparm/proof/checker.py",
+    "rparm/linearization/*.py", "rparm/fmi/compiled_*.py",
 )  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]

@@ -11,13 +11,12 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import rparm
-from rparm import project, shipped
+from rparm import project
 from rparm.command_line import COMMANDS
 from rparm.errors import UserError
 from tests.platforms.model import CHANGED, METHODS
-from tests.platforms.platforms import PLATFORMS, Missing, Platform, Runner, emulator_of, finish
+from tests.platforms.platforms import PLATFORMS, Missing, Platform, Runner
 from tests.platforms.transcript import first_difference
-from tests.prove import problems
 from tests.support.installed import RELEASE, Installed, wheel_of_release
 from tests.support.missing import missing
 from tests.support.paths import NAMES, ROOT, SYSTEMS
@@ -187,27 +186,7 @@ def test_what_is_not_installed_is_named(
         rparm.build(model)
 
 
-# ---- The programs that prove ---------------------------------------------------------------------
-
-
-@each_platform
-def test_programs_of_every_platform_prove_the_same(row: Platform, tmp_path: Path) -> None:
-    if not (RELEASE / ARCHIVE).is_file():
-        missing(f"{RELEASE} has no {ARCHIVE}: ./release.sh builds it")
-    folder = shipped.unpacked(RELEASE / ARCHIVE, tmp_path) / row.preset / "proof"
-    (program,) = folder.glob("prove*")
-    try:
-        command = [*emulator_of(row), str(program)]
-    except Missing as error:
-        missing(f"missing: {error}")
-    for case in problems.SMALL.values():
-        answer = tmp_path / "answer"
-        # 1: an event ends the proof
-        script = 'input=$1 answer=$2; shift 2; "$@" <"$input" >"$answer" || [ $? = 1 ]'
-        (tmp_path / "asked").write_text("".join(case.problem), encoding="utf-8")
-        finish(["sh", "-c", script, "sh", str(tmp_path / "asked"), str(answer), *command], tmp_path)
-        case.run()
-        assert answer.read_text().splitlines() == case.points != []
+# ---- Proofs --------------------------------------------------------------------------------------
 
 
 def test_the_wheel_proves(installed: Installed) -> None:

@@ -1,0 +1,376 @@
+"""Encloses a motion step by step: Lohner's method with a box of high order, in arb's intervals.
+
+README.md has the theorems.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import reduce
+from operator import add, mul
+
+import flint
+import numpy as np
+from flint import arb, arb_mat, arb_series
+
+from rparm.proof.problem import ARITHMETIC, Node, Problem
+
+BITS = 128
+ACCURATE = 2.0**-104  # a remainder that is small enough: in units of the state,
+ROUNDED = 2.0**-6  # or of this share of the state,
+SHARE = 2.0**-20  # or of this share of the hull's radius
+LAST_ORDER = 48
+SHORTEST = 2.0**-40  # a step over what remains of a communication step, at least
+AHEAD = 2.0**-32  # how far ahead, in what remains, the reason is looked for where none is known
+CROSSINGS = [2.0**-k for k in (36, 28, 20, 12, 4)]  # lengths in which an event is looked for
+MOST_ATTEMPTS = 100_000  # within a communication step
+ROOM, WIDE = (
+    2.0**-8,
+    2.0**-3,
+)  # by which a box is larger than what was estimated: of that, of the hull
+# so that another theorem can confirm what is claimed: enlarges derivatives' radii, and remainders
+LOOSENED, ALLOWED = 1.0, 8.0
+ZERO, ONE, UNIT = arb(0), arb(1), arb(0, 1)
+
+
+class Obstacle(Exception):
+    """Why a step cannot be; one that is `factor` times as long may be possible."""
+
+    def __init__(self, kind: str, where: int, factor: float) -> None:
+        self.kind, self.where, self.factor = kind, where, factor
+
+
+@contextmanager
+def precision(bits: int, orders: int = LAST_ORDER) -> Iterator[None]:
+    """Calculate with so many bits, in series of so many terms."""
+    before = flint.ctx.prec, flint.ctx.cap
+    flint.ctx.prec, flint.ctx.cap = bits, orders
+    try:
+        yield
+    finally:
+        flint.ctx.prec, flint.ctx.cap = before
+
+
+# ---- Series --------------------------------------------------------------------------------------
+class Series:
+    """Taylor coefficients of all nodes along a motion, times the power of the step (Moore).
+
+    The slope of a function is a node, too: by the chain rule, y' = s x'.
+    """
+
+    def __init__(
+        self, problem: Problem, states: Sequence[arb], inputs: Sequence[arb], time: arb, step: arb
+    ) -> None:
+        self.problem, self.step = problem, step
+        values = problem.balls(states, inputs, time, problem.of_series)
+        bad = next((i for i, x in enumerate(values) if not x.is_finite()), None)
+        if bad is not None:
+            raise Obstacle("undefined" if bad >= len(states) else "growth", bad, 0.5)
+        self.rows = [[x] for x in values]
+        self.paces: dict[int, list[arb]] = {}  # j x_j of functions' arguments
+
+    def extend(self) -> list[arb]:
+        """Add the next order; return that of the states."""
+        nodes, rows, k = self.problem.nodes, self.rows, len(self.rows[0])
+        share, n = self.step / k, len(self.problem.states)
+        for row, rate in zip(rows[:n], self.problem.rates, strict=True):
+            row.append(rows[rate][k - 1] * share)
+        for i in range(n, self.problem.of_series):
+            op, arguments, moves, _, slope, _ = nodes[i]
+            row, found = rows[i], ZERO
+            first, second = (arguments[0], arguments[-1]) if arguments else (i, i)
+            x, y = rows[first], rows[second]
+            if not moves or (op == "time" and k > 1):
+                pass
+            elif op == "*" and nodes[first].moves and nodes[second].moves:
+                found = sum(map(mul, x, y[::-1]))
+            elif op == "*":
+                found = x[k] * y[0] if nodes[first].moves else x[0] * y[k]
+            elif op == "/":  # x = y q
+                known = sum(map(mul, y[:0:-1], row)) if nodes[second].moves else ZERO
+                found = (x[k] - known) / y[0]
+            elif slope is not None:
+                pace = self.paces.setdefault(i, [])
+                pace.append(x[k] * k)
+                found = sum(map(mul, pace, rows[slope][k - 1 :: -1])) / k
+            elif op == "time":
+                found = self.step
+            else:
+                found = ARITHMETIC[op](*(rows[j][k] for j in arguments))
+            row.append(found)
+        return [row[k] for row in rows[:n]]
+
+    def linear(self, orders: int) -> list[arb_mat]:
+        """Return the coefficients of the derivatives of the rates by the states."""
+        problem, n = self.problem, len(self.problem.states)
+        partials: list[dict[int, arb_series]] = []  # by the states
+        with precision(flint.ctx.prec, orders):
+            values = [arb_series(row[:orders]) for row in self.rows]
+            for i, node in enumerate(problem.nodes[: problem.of_rates]):
+                found = {i: arb_series([1])} if i < n else {}
+                if node.moves and node.arguments:
+                    slopes = _slopes(node, values, values[i])
+                    for j, slope in zip(node.arguments, slopes, strict=True):
+                        for state, x in partials[j].items():
+                            term = x * slope
+                            found[state] = found[state] + term if state in found else term
+                partials.append(found)
+            none = arb_series([0])
+            rows = [[partials[rate].get(j, none) for j in range(n)] for rate in problem.rates]
+            return [arb_mat([[x[k] for x in row] for row in rows]) for k in range(orders)]
+
+
+def _slopes(node: Node, values: list[arb_series], value: arb_series) -> tuple[arb_series, ...]:
+    """Return the derivatives of a node's value by its arguments."""
+    x, *others = (values[j] for j in node.arguments)
+    match node.op:
+        case "+":
+            return ONE, ONE
+        case "-":
+            return ONE, -ONE
+        case "*":
+            return others[0], x
+        case "/":
+            return 1 / others[0], -value / others[0]
+        case "negative":
+            return (-ONE,)
+    return (values[node.slope],)
+
+
+def flow(linear: Sequence[arb_mat], begin: arb_mat, step: arb) -> list[arb_mat]:
+    """Return the coefficients of Y in Y' = linear Y, one more than are given."""
+    found = [begin]
+    for k in range(len(linear)):
+        terms = [linear[j] * found[k - j] for j in range(k + 1)]
+        found.append(added(terms) * (step / (k + 1)))
+    return found
+
+
+def added(matrices: Sequence[arb_mat]) -> arb_mat:
+    """Add matrices."""
+    return reduce(add, matrices)
+
+
+# ---- Sets ----------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class States:
+    """A set of states: centre + frame y + spread s, with y and s in balls around 0."""
+
+    centre: arb_mat  # columns: exact numbers
+    frame: arb_mat
+    y: arb_mat
+    spread: arb_mat  # of starts, whose s stay the same
+    s: arb_mat
+
+    def hull(self) -> arb_mat:
+        """Return intervals that contain it, as a column."""
+        return self.centre + self.frame * self.y + self.spread * self.s
+
+
+def column(values: Sequence[arb]) -> arb_mat:
+    """Make a column of a matrix."""
+    return arb_mat(len(values), 1, [*values])
+
+
+def around_zero(values: arb_mat) -> arb_mat:
+    """Return balls around 0 that contain these."""
+    return arb_mat(values.nrows(), values.ncols(), [UNIT * x.abs_upper() for x in values.entries()])
+
+
+def start_of(values: Sequence[arb], radii: Sequence[float]) -> States:
+    """Return the set of these starts, each of which may be off by a radius."""
+    n = len(values)
+    one = identity(n)
+    roundings = column([x - x.mid() for x in values])
+    spread = one if any(radii) else arb_mat(n, n)
+    return States(
+        column([x.mid() for x in values]), one, roundings, spread,
+        column([UNIT * arb(r) for r in radii]),
+    )  # fmt: skip
+
+
+def identity(n: int) -> arb_mat:
+    """Return the matrix 1."""
+    return arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+
+
+# ---- Steps ---------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Step:
+    """A step, and what it claims: motions that begin in a set end in the next one, `after`."""
+
+    length: arb  # s
+    after: States
+    # no claims, but of use to who checks it: coefficients of a motion, of derivatives by its start
+    motion: list[list[arb]]
+    flow: list[arb_mat]
+
+
+@dataclass
+class Stepper:
+    """Takes steps from a set of states."""
+
+    problem: Problem
+    states: States
+    at: arb  # s
+    longest: float = math.inf  # s, of the step that is tried next
+
+    def advance(self, end: float, inputs: Sequence[arb]) -> Iterator[Step]:
+        """Take steps to the next communication point; Obstacle where none is possible."""
+        for _ in range(MOST_ATTEMPTS):
+            remaining = arb(end) - self.at
+            is_last = not self.longest < remaining
+            length = remaining if is_last else arb(self.longest)
+            size = float(length.mid())
+            try:
+                step = self.step(length, inputs)
+            except Obstacle as obstacle:
+                self.longest = size * obstacle.factor
+                if self.longest < SHORTEST * float(remaining.mid()):
+                    raise self._named(obstacle, remaining, inputs) from None
+                continue
+            orders = len(step.motion[0])
+            self.longest = max(self.longest, size * (1.25 if orders < LAST_ORDER - 5 else 1.0))
+            self.states, self.at = step.after, arb(end) if is_last else self.at + length
+            yield step
+            if is_last:
+                return
+        raise Obstacle("growth", 0, 0.5)
+
+    def _named(self, obstacle: Obstacle, remaining: arb, inputs: Sequence[arb]) -> Obstacle:
+        """Where states grow: look for a node without bounds a little ahead, which may be why."""
+        if obstacle.kind != "growth":
+            return obstacle
+        ahead, n = UNIT * AHEAD * remaining, len(self.problem.states)
+        hull, count = self.states.hull().entries(), self.problem.of_series
+        values = self.problem.balls(hull, inputs, self.at, count)
+        wide = [x + values[rate] * ahead for x, rate in zip(hull, self.problem.rates, strict=True)]
+        values = self.problem.balls(wide, inputs, self.at + ahead, count)
+        bad = [i for i in range(n, count) if not values[i].is_finite()]
+        return Obstacle("undefined", bad[0], 0.5) if bad else obstacle
+
+    def crossing(self, guard: int, end: float, inputs: Sequence[arb]) -> Step | None:
+        """Go on as if there were no event; a step at whose end a guard has the other sign."""
+        node, is_positive, _ = self.problem.guards[guard]
+        for shorter in CROSSINGS:
+            length = (arb(end) - self.at) * shorter
+            try:
+                step = self.step(length, inputs, guarded=False)
+            except Obstacle:
+                continue
+            hull, time = step.after.hull().entries(), self.at + length
+            x = self.problem.balls(hull, inputs, time, node + 1)[node]
+            if x < 0 if is_positive else x > 0:
+                return step
+        return None
+
+    def step(self, length: arb, inputs: Sequence[arb], guarded: bool = True) -> Step:
+        """Take a step of this length; Obstacle if it cannot be."""
+        problem, before, begin = self.problem, self.states, self.at
+        n, hull = len(problem.states), before.hull().entries()
+        middle = self._middle(length, inputs)
+        half = len(middle.rows[0]) // 2
+        near = Series(problem, hull, inputs, begin, length)
+        for _ in range(half):
+            near.extend()
+        box = self._box(middle, near, inputs)
+        remainder = [UNIT * (ALLOWED * x.abs_upper()) for x in self._remainder(box, middle, near)]
+        motion = middle.rows[:n]
+        if guarded:
+            self._guard(near, box)
+        # |Y - 1| is at most e^(the size of f's derivatives) - 1, for each element
+        far = box.linear(half + 1)
+        sizes = arb_mat(n, n, [x.abs_upper() for x in (far[0] * length).entries()])
+        wide = identity(n) + around_zero(sizes.exp() - identity(n))
+        derivatives = flow(near.linear(half), identity(n), length)
+        jacobian = added(derivatives) + flow(far, wide, length)[-1]
+        jacobian = arb_mat(n, n, [x + (x - x.mid()) * LOOSENED for x in jacobian.entries()])
+        try:
+            after = self._moved(column([*map(sum, motion)]) + column(remainder), jacobian)
+        except ZeroDivisionError:
+            raise Obstacle("growth", 0, 0.5) from None
+        for i, x in enumerate(after.hull().entries()):
+            if not x.is_finite():
+                raise Obstacle("growth", i, 0.75)
+        middles = [[x.mid() for x in row] for row in motion]
+        return Step(length, after, middles, [x.mid() for x in derivatives])
+
+    def _middle(self, length: arb, inputs: Sequence[arb]) -> Series:
+        """Return the series of the centre: as many orders as change anything."""
+        centre = self.states.centre.entries()
+        small = [small_for(x) / 4 for x in centre]
+        series = Series(self.problem, centre, inputs, self.at, length)
+        size = last = math.inf
+        while size + last > 1:
+            sizes = [upper(x) / s for x, s in zip(series.extend(), small, strict=True)]
+            last, size = size, max(sizes)
+            if len(series.rows[0]) >= LAST_ORDER or not size < math.inf:
+                raise Obstacle("growth", sizes.index(size), 0.875)
+        return series
+
+    def _box(self, middle: Series, near: Series, inputs: Sequence[arb]) -> Series:
+        """Return the series of all motions from a box at all times of the step: a guess."""
+        box = []
+        for x, row in zip(middle.rows, near.rows[: len(self.problem.rates)], strict=False):
+            later = [*row[2:], *x[len(row) :]]
+            reach = sum((y.abs_upper() for y in later), row[1].abs_upper() / 2 + row[0].rad())
+            radius = reach * (1 + ROOM) + row[0].rad() * WIDE + small_for(row[0])
+            box.append(row[0].mid() + row[1].mid() / 2 + UNIT * radius.abs_upper())
+        times = self.at + near.step * arb(0.5, 0.5)
+        return Series(self.problem, box, inputs, times, near.step)
+
+    def _remainder(self, box: Series, middle: Series, near: Series) -> list[arb]:
+        """Return the coefficients after the last order over the box, which holds all motions."""
+        last: list[arb] = []
+        for _ in middle.rows[0]:
+            last = box.extend()
+        for i, (row, wide) in enumerate(zip(near.rows[: len(last)], box.rows, strict=False)):
+            terms = [*row[2:], wide[len(row)]]
+            reached = row[0] + row[1] * arb(0.5, 0.5) + UNIT * sum(y.abs_upper() for y in terms)
+            if not wide[0].contains_interior(reached):
+                raise Obstacle("growth", i, 0.75)
+        most = [max(small_for(x[0]), SHARE * upper(x[0].rad())) for x in near.rows[: len(last)]]
+        while bad := [i for i, x in enumerate(last) if not upper(x) * ALLOWED <= most[i]]:
+            if len(middle.rows[0]) >= LAST_ORDER:
+                raise Obstacle("growth", bad[0], 0.8125)
+            middle.extend()
+            last = box.extend()
+        return last
+
+    def _guard(self, near: Series, box: Series) -> None:
+        """Refuse a step in which a guard may become 0: where it begins at 0, its slope decides."""
+        for i, (node, is_positive, _) in enumerate(self.problem.guards):
+            row = box.rows[node]
+            x = row[1] if near.rows[node][0].is_zero() else row[0]
+            if not (x > 0 if is_positive else x < 0):
+                raise Obstacle("event", i, 0.5)
+
+    def _moved(self, end: arb_mat, jacobian: arb_mat) -> States:
+        """Return the set at the end, by the mean value theorem."""
+        before, centre = self.states, end.mid()
+        framed, spread = jacobian * before.frame, jacobian * before.spread
+        middle = spread.mid()
+        frame = _frame(framed, before.y)
+        inverse = frame.inv()
+        rest = end - centre + (spread - middle) * before.s
+        y = inverse * rest + (inverse * framed) * before.y
+        return States(centre, frame, around_zero(y), middle, before.s)
+
+
+def _frame(framed: arb_mat, y: arb_mat) -> arb_mat:
+    """Return the orthogonal factor, the longest side first; any invertible matrix would do."""
+    sides = np.array([[float(x.mid()) for x in row] for row in framed.tolist()])
+    sides = sides * [upper(x) for x in y.entries()]
+    longest = np.argsort(-np.linalg.norm(sides, axis=0))
+    return arb_mat(np.linalg.qr(sides[:, longest])[0].tolist())
+
+
+def upper(x: arb) -> float:
+    """Return a double not below |x|, hardly above; of 0 it is 0."""
+    return 0.0 if x.is_zero() else math.nextafter(float(x.abs_upper()), math.inf)
+
+
+def small_for(state: arb) -> float:
+    """Return what is small for a state of this size."""
+    return ACCURATE * max(1.0, ROUNDED * upper(state))
