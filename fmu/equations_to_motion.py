@@ -17,7 +17,11 @@ def main() -> int:
     parser.add_argument("--output", type=Path, help="a file for it")
     arguments = parser.parse_args()
     try:
-        text = json.dumps(motion(read(arguments.file)))
+        file = read(arguments.file)
+        if file.hook:  # its C decides when events are
+            expected = "expected a model whose motion can be proven, got one with events in C"
+            raise WrongInputError(f"{arguments.file}: [hook]: {expected}")
+        text = json.dumps(motion(file))
         if arguments.output:
             arguments.output.write_text(text, encoding="utf-8")
         else:

@@ -264,7 +264,7 @@ class _Tube:
     def _deviation(self, defect: list[list[arb]]) -> list[list[arb]]:
         """Add bounds of (Df Y - Y') w in the tube."""
         orders, n = self.orders[1], len(self.p)
-        added = [[*sizes] for sizes in defect]
+        added = [[*x, *[arb(0)] * (orders + 1 - len(x))] for x in defect]
         found = []
         with precision(BITS, orders + 1):
             for over in (False, True):

@@ -24,13 +24,13 @@ LAST_ORDER = 48
 SHORTEST = 2.0**-40  # a step over what remains of a communication step, at least
 AHEAD = 2.0**-32  # how far ahead, in what remains, the reason is looked for where none is known
 CROSSINGS = [2.0**-k for k in (36, 28, 20, 12, 4)]  # lengths in which an event is looked for
+LARGEST_GROWTH = 64.0  # of a state within a step: derivatives of fewer orders are good up to there
 MOST_ATTEMPTS = 100_000  # within a communication step
-ROOM, WIDE = (
-    2.0**-8,
-    2.0**-3,
-)  # by which a box is larger than what was estimated: of that, of the hull
-# so that another theorem can confirm what is claimed: enlarges derivatives' radii, and remainders
-LOOSENED, ALLOWED = 1.0, 8.0
+# by which a box is larger than what was estimated: of that, and of the hull
+ROOM, WIDE = 2.0**-8, 2.0**-3
+# what is claimed is larger, so that another theorem can confirm it: derivatives' radii, remainders,
+# and the set
+LOOSENED, ALLOWED, CONFIRMED = 1.0, 8.0, 1 + arb(2) ** -16
 ZERO, ONE, UNIT = arb(0), arb(1), arb(0, 1)
 
 
@@ -280,11 +280,24 @@ class Stepper:
         if guarded:
             self._guard(near, box)
         # |Y - 1| is at most e^(the size of f's derivatives) - 1, for each element
-        far = box.linear(half + 1)
-        sizes = arb_mat(n, n, [x.abs_upper() for x in (far[0] * length).entries()])
-        wide = identity(n) + around_zero(sizes.exp() - identity(n))
+        sizes = box.linear(1)[0] * length
+        most = arb_mat(n, n, [x.abs_upper() for x in sizes.entries()]).exp()
+        for i in range(n):
+            if not most[i, i] < LARGEST_GROWTH:
+                raise Obstacle("growth", i, 0.75)
+        wide = identity(n) + around_zero(most - identity(n))
+        while True:
+            last = flow(box.linear(half + 1), wide, length)[-1]
+            sizes = zip(last.entries(), most.entries(), strict=True)
+            if half > LAST_ORDER or all(abs(x) <= SHARE * y for x, y in sizes):
+                break
+            half += 4
+            while len(box.rows[0]) <= half:
+                box.extend()
+            while len(near.rows[0]) < half:
+                near.extend()
         derivatives = flow(near.linear(half), identity(n), length)
-        jacobian = added(derivatives) + flow(far, wide, length)[-1]
+        jacobian = added(derivatives) + last
         jacobian = arb_mat(n, n, [x + (x - x.mid()) * LOOSENED for x in jacobian.entries()])
         try:
             after = self._moved(column([*map(sum, motion)]) + column(remainder), jacobian)
@@ -355,7 +368,7 @@ class Stepper:
         inverse = frame.inv()
         rest = end - centre + (spread - middle) * before.s
         y = inverse * rest + (inverse * framed) * before.y
-        return States(centre, frame, around_zero(y), middle, before.s)
+        return States(centre, frame, around_zero(y) * CONFIRMED, middle, before.s)
 
 
 def _frame(framed: arb_mat, y: arb_mat) -> arb_mat:
