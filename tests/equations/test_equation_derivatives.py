@@ -206,7 +206,7 @@ def test_a_series_with_values_side_by_side_is_the_same(
         np.array([[point["u"], 0.3, -0.2, 0.1]]),
         12,
     )
-    monkeypatch.setattr("compiler.write.c_series.FEWEST_IN_PAIRS", WIDE)
+    monkeypatch.setattr("compiler.write.sums.FEWEST_IN_PAIRS", WIDE)
     text = model.file.text.partition("[outputs]")[0]
     one_by_one = Model(tmp_path, text)
     np.testing.assert_array_equal(one_by_one.series(*given), model.series(*given))

@@ -624,12 +624,21 @@ def unsigned(value: Value) -> Value:
     return value.arguments[0] if value.op == "negative" else value
 
 
+def read_in_series(value: Value) -> tuple[Value, ...]:
+    """Those of which the series of a value reads coefficients of the same order."""
+    if not value.moves or value.op in CONDITIONS:
+        return ()
+    if value.op == "if":
+        return value.arguments[2:] if is_unknown(value) else value.arguments[1:]
+    return value.arguments[1:] if value.op == "moving_as" else value.arguments
+
+
 def with_partials(graph: Graph, roots: Iterable[Value]) -> list[Value]:
-    """All values that the roots and their derivatives of any order by the time follow from."""
+    """All values that the series of the roots follow from."""
     done: dict[Value, None] = {}
     todo = list(roots)
     while todo:
-        new = in_order(todo, done)
+        new = in_order(todo, done, read_in_series)
         done |= dict.fromkeys(new)
         todo = [
             unsigned(partial)

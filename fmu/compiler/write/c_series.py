@@ -8,9 +8,9 @@ move is taken out of the sums, so that more of them are the same.
 
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import partial, reduce
-from itertools import combinations, groupby
-from typing import NamedTuple
+from itertools import groupby
 
 from ..expressions.expression import in_order
 from ..graph.graph import (
@@ -20,31 +20,27 @@ from ..graph.graph import (
     STEEP,
     Graph,
     Value,
-    is_unknown,
+    read_in_series,
     unsigned,
     with_partials,
 )
+from ..plain_c.values import Conditions
+from .blocks import Blocks
+from .branches import AtOrigin, OfOrder, Opened, plan_with_partials, within
 from .c_code import WITHOUT_DERIVATIVES, Code, Leaves, called
-from .c_text import indented
+from .guards import Path, Plan, cost, with_guards
 from .loops import OF_MODELS, SHORTEST, printed
 from .statements import Block, Item, Operand, Place, Statement, store
+from .sums import Sums, Term
 
-FEWEST_IN_PAIRS = 4  # sums of a series that gains by adding up two at once
 WIDE = 150  # values that move in a model whose series has elements side by side
+ALIKE = 2  # such values of a form; models with fewer gain more by blocks for their choices
 VANISHING = 5  # factors of a product whose zero may have as many orders as the shortest series
+COST_OF_SUM = 10  # of products in a coefficient
 FLAT = 4  # degree of divisors whose small values show in the states' own terms, not between points
 
 
 OF_SERIES = OF_MODELS | {"row", "origin", "last", "i", "k", "h", "at", "s", "over_k"}
-
-
-class Term(NamedTuple):
-    """x_i y_(k-i) of a sum over i, times i if it is weighted; of a rate x_(i-1)."""
-
-    x: Value
-    y: Value
-    is_weighted: bool
-    is_rate: bool
 
 
 class Series:
@@ -55,11 +51,14 @@ class Series:
     ) -> None:
         self.graph, self.leaves = graph, leaves
         roots = [*rates.values(), *followed]
-        self.is_wide = sum(value.moves for value in in_order(roots)) >= WIDE
+        self.is_wide = is_wide(roots, leaves.conditions)
         roots = scaled(graph, roots, self.is_wide)
+        if not self.is_wide:
+            became = with_guards(roots, leaves.conditions)
+            roots = [became[root] for root in roots]
         self.rates = dict(zip(rates, roots, strict=False))
         values = [value for value in with_partials(graph, roots) if value.moves]
-        self.sums: dict[Term, Place] = {}
+        self.sums = Sums(self._row)
         factors = {factor for value in values for factor in self._read(value)}
         needed = [v for v in values if (v in factors or v in roots) and v not in rates]
         self.order = {value: i for i, value in enumerate([*rates, *needed])}  # in products
@@ -75,24 +74,20 @@ class Series:
         self.row_count = len(self.rows) + len(self.columns)
         self.row_of_followed = [self.rows.get(value, 0) for value in roots[len(rates) :]]
         self.still = Code(leaves)  # what does not move
-        self.first = Code(self._own_leaves("0"), self.still)
-        targets = {place: value for value in needed for place in self._places(value, "0")}
-        targets |= {self._row(value, "0"): value for value in self.columns if value in rates}
-        self.first.assign(targets)
-        self.start = Code(self._own_leaves("0"), self.still)
+        self.first = Code(self.leaves_at("0"), self.still)
+        self.start = Code(self.leaves_at("0"), self.still)
         self.start.known |= {value: self._row(value, "0") for value in needed}
-        self.later = Code(self._own_leaves("k"), self.still)
+        self.later = Code(self.leaves_at("k"), self.still)
         self.has_over_k = False  # whether coefficients need 1 / k
-        self._coefficients: dict[Value, Operand] = {v: 0.0 for v in values if v.op in CONDITIONS}
+        self._coefficients: dict[Value, Operand] = {}
         self._late: list[Item] = []  # statements for the values of one form
-        asked = [*rates, *needed]
-        if self.is_wide:  # all that they follow from, too
-            asked = sorted((v for v in in_order(asked) if v.moves), key=self.forms.__getitem__)
-        for _, same in groupby(asked, lambda value: self.is_wide and self.forms[value]):
-            for value in same:
-                self._at(value)
-            self.later.statements += self._late
-            self._late.clear()
+        self._path: Path = ()  # of the value whose coefficient is written
+        plan = plan_with_partials(graph, [root for root in roots if root.moves], self._cost)
+        self.opened = Opened(plan)
+        if plan.choices and not self.is_wide:
+            self._write_branches(plan, needed)
+        else:
+            self._write_all(needed)
         self.integrals: list[Item] = []
         if self.has_over_k:
             self.integrals.append(Statement(("const double over_k = 1.0 / k;",)))
@@ -105,11 +100,70 @@ class Series:
                 last = "if", ("==", "k", "1"), ("*", "h", self.still.of(rate)), 0.0
             self.integrals.append(store(Place("row[", i, "][k]"), last))
 
+    def _write_all(self, needed: list[Value]) -> None:
+        """Write all rows in the order of the values."""
+        targets = {place: value for value in needed for place in self.places(value, "0")}
+        targets |= {self._row(value, "0"): value for value in self.columns if value in self.rates}
+        self.first.assign(targets)
+        asked = [*self.rates, *needed]
+        if self.is_wide:  # all that they follow from, too
+            asked = in_order(asked, read=read_in_series)
+            asked = sorted((v for v in asked if v.moves), key=self.forms.__getitem__)
+        for _, same in groupby(asked, lambda value: self.is_wide and self.forms[value]):
+            for value in same:
+                self._at(value)
+            self.later.statements += self._late
+            self._late.clear()
+
+    def _write_branches(self, plan: Plan, needed: list[Value]) -> None:
+        """Write rows in the branches that need them."""
+        self.first = AtOrigin(self, needed)
+        hidden = {v for pair in self._inner() for v in pair if self.opened.path(v)}
+        zeros = [store(self._row(v, "k"), 0.0) for v in hidden]
+        clear = [Block("int k = 0; k < SERIES_LENGTH; k++", (zeros,), "for")] * bool(zeros)
+        self.first.statements = [*clear, *Blocks(self.first, plan).written()[1]]
+        moving = replace(plan, choices=[choice for choice in plan.choices if choice.moves])
+        self.later.statements = Blocks(OfOrder(self), moving).written()[1]
+        self.opened.write(self.still, self.condition, moves=False)
+        self.opened.write(self.start, self.condition, moves=True)
+
+    def _cost(self, value: Value) -> int:
+        """Estimate how long a coefficient takes."""
+        return (COST_OF_SUM if self._read(value) else cost(value)) if value.moves else 0
+
+    def coefficient_in(
+        self, path: Path, value: Value, given: Iterable[tuple[Value, Operand]]
+    ) -> Operand:
+        """Return the coefficient of a value in a block, from those that it reads."""
+        self._path = path
+        self._coefficients.update(given)
+        found = self._coefficient(value)
+        self._path = ()
+        return found
+
+    def condition(self, value: Value, path: Path) -> Operand:
+        """Return the operand of a condition, which stays as it is at the origin."""
+        before, self._path = self._path, path
+        found = self._known(value)
+        self._path = before
+        return found
+
+    def _known(self, value: Value) -> Operand:
+        """Return the operand of what is the same for all orders."""
+        code = self.start if value.moves else self.still
+        is_simple = not value.arguments or value in code.known
+        is_cheap = not value.moves and value.op in CONDITIONS
+        if is_simple or is_cheap or not self._path:
+            return code.of(value)
+        return self.opened.variable(value, self._path)
+
     def inner(self) -> list[str]:
         """What may be nothing at the begin of a step and large within, and its argument."""
+        return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in self._inner()]
+
+    def _inner(self) -> list[tuple[Value, Value]]:
         values = (value for value in self.columns or self.rows)
-        pairs = [(value, argument) for value in values for argument in self._arguments(value)]
-        return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in pairs]
+        return [(value, argument) for value in values for argument in self._arguments(value)]
 
     @property
     def may_vanish(self) -> bool:
@@ -138,7 +192,7 @@ class Series:
     def parts(self) -> dict[str, list[str]]:
         """What equations.c.in has blocks for."""
         if self.is_wide:
-            self._sort_sums()
+            self.sums.sort(lambda value: (self.forms[value], self.order[value]))
             width = len(self.columns)
             own = f"double(*const at)[{width}] = (double(*)[{width}])(void *)row[{len(self.rows)}];"
             self.still.statements.insert(0, Statement((own,)))
@@ -146,95 +200,31 @@ class Series:
             "still": self.still.statements,
             "first": self.first.statements,
             "start": self.start.statements,
-            "sums": [Statement(("double ", to, " = 0.0;")) for to in self.sums.values()],
-            "terms": [store(to, self._of_term(term), "+=") for term, to in self.sums.items()],
+            "sums": [*self.sums.places],
+            "terms": [*self.sums.places],
             "integrals": self.integrals,
             "later": self.later.statements,
         }
-        is_long = sum(map(len, parts.values())) >= SHORTEST
-        parts["both"] = [  # two terms at once: half the additions wait for each other
-            store(to, ("+", self._of_term(term), self._of_term(term, 1)), "+=")
-            for term, to in self.sums.items()
-        ]
-        if is_long or self.is_wide:
-            for to in self.sums.values():
-                to.before, to.after = "s[", "]"
-            own = [Statement((f"double s[{len(self.sums)}];",))] * bool(self.sums)
-            parts["sums"] = [*own, *(store(to, 0.0) for to in self.sums.values())]
-        elif len(self.sums) >= FEWEST_IN_PAIRS:
-            self._pair(parts)
-        taken = OF_SERIES.union(*({f"s{i}", f"p{i}"} for i in range(len(self.sums))))
+        is_long = not self.opened.conditions and sum(map(len, parts.values())) >= SHORTEST
+        if self.is_wide:
+            found = self.sums.in_array()
+            found.terms = self.sums.terms(self.sums.places)
+        else:
+            found = self.sums.parts(
+                is_long, lambda path, items: within(path, items, self.condition)
+            )
+        parts["sums"], parts["terms"] = found.sums, found.terms
+        for name, before, behind in (
+            ("still", [], found.still),
+            ("start", [], found.start),
+            ("integrals", found.after, []),
+            ("later", [], found.own),
+        ):
+            parts[name] = [*before, *parts[name], *behind]
+        taken = OF_SERIES.union(*({f"s{i}", f"p{i}"} for i in range(len(self.sums.places))))
         # a place's name would be a load in each turn, where an operation can read memory
         lines = printed(*parts.values(), taken=taken, is_long=is_long, has_named_places=False)
-        found = dict(zip(parts, lines, strict=True))
-        both, terms = found.pop("both"), found["terms"]
-        if self.is_wide and terms:
-            found["terms"] = ["for (int i = 1; i < k; i++) {", *indented(terms), "}"]
-        elif terms:
-            last = ["if (k % 2 == 0) {", *indented(["const int i = k - 1;", *terms]), "}"]
-            each = ["for (int i = 1; i + 1 < k; i += 2) {", *indented(both), "}"]
-            found["terms"] = [*each, *last]
-        return found
-
-    def _of_term(self, term: Term, further: int = 0) -> Operand:
-        """Term i of a sum, or the next one."""
-        i, rest = ("i + 1", "k - i - 1") if further else ("i", "k - i")
-        of_x = {"i": "i - 1", "i + 1": "i"}[i] if term.is_rate else i
-        x = self._row(term.x, of_x)
-        if term.is_weighted:
-            x = "*", ("+", "i", "1") if further else "i", x
-        return "*", x, self._row(term.y, rest)
-
-    def _pair(self, parts: dict[str, list[Item]]) -> None:
-        """Add up two sums at once, with the same bits: their factors stand side by side."""
-        columns: dict[tuple[Value, Value], int] = {}
-        left = [term for term in self.sums if not term.is_weighted]
-        sums, terms, both, after = [], [], [], []
-
-        def cost(pair: tuple[Term, Term]) -> tuple[int, bool]:
-            """Count the columns that it adds; then prefer two sums with the same factor."""
-            sides = [(pair[0][i], pair[1][i]) for i in (0, 1)]
-            return sum(side not in columns for side in sides), all(a is not b for a, b in sides)
-
-        while pairs := [p for p in combinations(left, 2) if p[0].is_rate == p[1].is_rate]:
-            one, other = best = min(pairs, key=cost)
-            left = [term for term in left if term not in best]
-            a, b = (columns.setdefault((one[i], other[i]), len(columns)) for i in (0, 1))
-            name, before = f"p{len(sums)}", " - 1" * one.is_rate
-            product = f"at[i{before}][{a}].of LANE * at[k - i][{b}].of LANE"
-            after_it = f"at[i{'' if before else ' + 1'}][{a}].of LANE * at[k - i - 1][{b}].of LANE"
-            sums.append(Statement((f"struct pair {name} = {{{{0.0, 0.0}}}};",)))
-            terms.append(Statement((f"EACH {name}.of LANE += {product};",)))
-            both.append(Statement((f"EACH {name}.of LANE += {product} + {after_it};",)))
-            for i, term in enumerate(best):
-                after.append(Statement(("const double ", self.sums[term], f" = {name}.of[{i}];")))
-        if not columns:
-            return
-        single = [i for i, term in enumerate(self.sums) if term in left or term.is_weighted]
-        for part, found in (("sums", sums), ("terms", terms), ("both", both)):
-            parts[part] = [*found, *(parts[part][i] for i in single)]
-        own = [
-            Statement((f"at[k][{i}] = (struct pair){{{{{row_a}, {row_b}}}}};",))
-            for (a, b), i in columns.items()
-            for row_a, row_b in [[f"row[{self.rows[value]}][k]" for value in (a, b)]]
-        ]
-        parts["still"].append(Statement((f"struct pair at[SERIES_LENGTH][{len(columns)}];",)))
-        each = [Statement(("    ", *item.parts)) for item in own]
-        head = Statement(("for (int k = 0; k == 0 || k < first; k++) {",))
-        parts["start"] = [*parts["start"], head, *each, Statement(("}",))]
-        parts["integrals"] = [*after, *parts["integrals"]]
-        parts["later"] = [*parts["later"], *own]
-
-    def _sort_sums(self) -> None:
-        """Put sums of one form side by side."""
-
-        def place(term: Term) -> tuple:
-            of = [term.x, term.y]
-            return term.is_weighted, [self.forms[v] for v in of], [self.order[v] for v in of]
-
-        self.sums = {term: self.sums[term] for term in sorted(self.sums, key=place)}
-        for i, to in enumerate(self.sums.values()):
-            to.index = i
+        return dict(zip(parts, lines, strict=True))
 
     def _row(self, value: Value, k: str) -> Place:
         """Where coefficient k is read."""
@@ -242,12 +232,12 @@ class Series:
             return Place(f"at[{k}][", self.columns[value], "]")
         return Place("row[", self.rows[value], f"][{k}]")
 
-    def _places(self, value: Value, k: str) -> list[Place]:
+    def places(self, value: Value, k: str) -> list[Place]:
         """Where coefficient k is written; it is read from the first place."""
         public = [Place("row[", self.rows[value], f"][{k}]")] if value in self.rows else []
         return [*([self._row(value, k)] if value in self.columns else []), *public]
 
-    def _own_leaves(self, k: str) -> Leaves:
+    def leaves_at(self, k: str) -> Leaves:
         """Coefficient k of all leaves."""
         own: dict[tuple[str, str], Operand] = {("time", ""): "origin->t"}
         for s, i in self.rows.items():
@@ -317,13 +307,13 @@ class Series:
     ) -> Operand:
         g, y = self._varying(y)
         term = Term(x, y, is_weighted, is_rate)
-        found = self.sums.setdefault(term, Place("s", len(self.sums)))
-        scale = self.still.of(times(self.graph, factor, g))
+        found = self.sums.add(term, self._path)
+        scale = self._known(times(self.graph, factor, g))
         return found if scale == 1.0 else ("*", scale, found)
 
     def _at(self, value: Value) -> Operand:
         """Coefficient k > 0."""
-        for needed in in_order([value], self._coefficients):
+        for needed in in_order([value], self._coefficients, read_in_series):
             self._coefficients[needed] = self._coefficient(needed)
         return self._coefficients[value]
 
@@ -344,7 +334,7 @@ class Series:
             found = self._of_function(value)
         else:
             found = self._of_operation(value)
-        targets = self._places(value, "k")
+        targets = self.places(value, "k")
         if not targets:
             return self.later.constant(found) if isinstance(found, tuple) else found
         self.later.statements += [store(target, found) for target in targets]
@@ -356,7 +346,7 @@ class Series:
             relative = "+" if sign == pairs[0][2] else "-"
             if g.moves:
                 terms.append((relative, self._change(x, g)))
-            terms.append((relative, ("*", self._at(x), self.start.of(g))))
+            terms.append((relative, ("*", self._at(x), self._known(g))))
         found = terms[0][1]
         for relative, term in terms[1:]:
             found = relative, found, term
@@ -366,9 +356,9 @@ class Series:
         are_finite = reduce(
             partial(self.graph.value, "and"), (self.graph.value("isfinite", g) for _, g, _ in pairs)
         )
-        is_known, otherwise = self.start.of(are_finite), self._where_steep(value)
+        is_known, otherwise = self._known(are_finite), self._where_steep(value)
         if value in self.columns and otherwise != 0.0:  # then the loop has no calls
-            steep = [store(place, otherwise) for place in self._places(value, "k")]
+            steep = [store(place, otherwise) for place in self.places(value, "k")]
             self._late.append(Block(("not", is_known), (steep,)))
             return found
         return "if", is_known, found, otherwise
@@ -385,15 +375,15 @@ class Series:
         rows = [self._row(v, "0") for v in (varying, value)]
         for row in rows:
             row.before = f"&{row.before}"
-        given = (rows[0], self.still.of(factor), self.still.of(exponent), "k", rows[1])
+        given = (rows[0], self._known(factor), self._known(exponent), "k", rows[1])
         return "slopes_power", *given, str(len(self.columns) or 1)
 
     def _of_operation(self, value: Value) -> Operand:
         a, b = value.arguments[0], value.arguments[-1]
         match value.op:
             case "if":
-                chosen = [self._at(x) for x in value.arguments[1:]]
-                return chosen[1] if is_unknown(value) else ("if", self.still.of(a), *chosen)
+                chosen = [self._at(x) for x in read_in_series(value)]
+                return ("if", self._known(a), *chosen) if len(chosen) == 2 else chosen[0]
             case op if op in WITHOUT_DERIVATIVES:
                 return self._at(b)
             case "+" | "-" if not b.moves:
@@ -401,25 +391,37 @@ class Series:
             case "+" | "-" if not a.moves:
                 return self._at(b) if value.op == "+" else ("negative", self._at(b))
             case "*" if a is b:
-                twice = self.start.of(self.graph.value("*", self.graph.number(2.0), a))
+                twice = self._known(self.graph.value("*", self.graph.number(2.0), a))
                 return "+", self._sum(a, a), ("*", twice, self._at(a))
             case "*" if a.moves and b.moves:  # last what is known last
                 a, b = sorted((a, b), key=lambda x: self.forms[x][0])
-                rest = "+", self._sum(a, b), ("*", self._at(a), self.start.of(b))
-                return "+", rest, ("*", self.start.of(a), self._at(b))
+                rest = "+", self._sum(a, b), ("*", self._at(a), self._known(b))
+                return "+", rest, ("*", self._known(a), self._at(b))
             case "/" if b.moves:
-                end = "*", self._at(b), self.start.of(value)
+                end = "*", self._at(b), self._known(value)
                 rest = "-", ("-", self._at(a), self._sum(b, value)), end
                 over = self._over(b)
-                product = "*", rest, self.start.of(over)
+                product = "*", rest, self._known(over)
                 if self.is_wide:  # too many conditions
                     return product
-                is_known = self.start.of(self.graph.value("isfinite", over))
-                return "if", is_known, product, ("/", rest, self.start.of(b))
+                is_known = self._known(self.graph.value("isfinite", over))
+                return "if", is_known, product, ("/", rest, self._known(b))
             case "/":
-                return "*", self._at(a), self.still.of(self._over(b))
-        given = [self._at(x) if x.moves else self.still.of(x) for x in value.arguments]
+                return "*", self._at(a), self._known(self._over(b))
+        given = [self._at(x) if x.moves else self._known(x) for x in value.arguments]
         return called(value.op, *given)
+
+
+def is_wide(roots: list[Value], conditions: Conditions) -> bool:
+    """Return whether so many values move that elements stand side by side."""
+    moving = [value for value in in_order(roots) if value.moves]
+    if len(moving) < WIDE:
+        return False
+    found = forms(moving)
+    if len(moving) >= ALIKE * len({found[value] for value in moving}):
+        return True
+    became = with_guards(roots, conditions)
+    return not Plan.of([became[root] for root in roots]).choices
 
 
 def multiplied(factor: Operand, term: Operand) -> Operand:
@@ -474,6 +476,10 @@ def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
             if is_wide and op == "/" and value.arguments[0].moves:
                 sign, given[0] = given[0][0], (one, given[0][1])
             whole = [product(*pair) for pair in given]
+            if op == "if" and (common_term := _common_term(*whole[1:])) is not None:
+                rest = graph.value("if", whole[0], *(x.arguments[0] for x in whole[1:]))
+                found[value] = one, graph.value("+", rest, common_term)
+                continue
             last = whole[-1]
             if is_wide and op in ("+", "-") and last.op == "negative" and last.moves:
                 op, whole[-1] = "-" if op == "+" else "+", last.arguments[0]
@@ -485,6 +491,13 @@ def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
         else:
             found[value] = one, value
     return [product(*found[root]) for root in roots]
+
+
+def _common_term(first: Value, second: Value) -> Value | None:
+    """Return what moves in two sums whose other terms rest."""
+    is_same = first.op == second.op == "+" and first.arguments[1] is second.arguments[1]
+    rests = [value.arguments[0] for value in (first, second)] if is_same else []
+    return first.arguments[1] if is_same and not any(rest.moves for rest in rests) else None
 
 
 def _zeros(root: Value) -> int:

@@ -54,7 +54,8 @@ class Plan:
     @classmethod
     def of(cls, roots: list[Value]) -> Plan:
         """Return the plan for values of a graph."""
-        order, found = in_order(roots), paths(roots)
+        order = in_order(roots)
+        found = paths(order, dict.fromkeys(roots, ()))
         return cls(roots, order, found, choices_in_blocks(order, found))
 
 
@@ -76,7 +77,8 @@ def choices_in_blocks(
     inside = costs_inside(order, places, cost_of or cost)
     return [
         value for value in order
-        if value.op == "if" and inside[places[value], value.arguments[0]] > MOST_CHOSEN
+        if value.op == "if" and not is_unknown(value)
+        and inside[places[value], value.arguments[0]] > MOST_CHOSEN
     ]  # fmt: skip
 
 
@@ -102,21 +104,21 @@ def _with(value: Value, arguments: list[Value], conditions: Conditions) -> Value
     return new
 
 
-def paths(roots: Iterable[Value]) -> dict[Value, Path]:
-    """Find the innermost branch that contains all uses of a value."""
-    found: dict[Value, Path] = dict.fromkeys(roots, ())
+def paths(order: Sequence[Value], roots: Mapping[Value, Path]) -> dict[Value, Path]:
+    """Find the innermost branch that contains all uses of a value, from the roots' branches."""
+    found = dict(roots)
 
     def use(value: Value, path: Path) -> None:
         found[value] = common(found[value], path) if value in found else path
 
-    for value in in_order([*found])[::-1]:
-        path = found[value]
-        for argument, literal in _uses(value):
+    for value in order[::-1]:
+        path = found.get(value)
+        for argument, literal in uses(value) if path is not None else ():
             use(argument, (*path, literal) if literal else path)
     return found
 
 
-def _uses(value: Value) -> list[tuple[Value, tuple[Value, bool] | None]]:
+def uses(value: Value) -> list[tuple[Value, tuple[Value, bool] | None]]:
     """Yield arguments, with the condition under which they are used."""
     if value.op != "if" or is_unknown(value):
         return [(argument, None) for argument in value.arguments]
@@ -169,7 +171,7 @@ def guarded(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value
 
 def settled(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value]:
     """Remove choices that the blocks around them have made; map each value to its successor."""
-    places = paths(roots)
+    places = paths(in_order(roots), dict.fromkeys(roots, ()))
     found: dict[Value, Value] = {}
     for value in in_order(roots):
         now = _with(value, [found[a] for a in value.arguments], conditions)
@@ -188,11 +190,11 @@ class Guards:
     def __init__(self, roots: Sequence[Value], conditions: Conditions) -> None:
         self.conditions = conditions
         self.order = in_order(roots)
-        self.paths = paths(roots)
+        self.paths = paths(self.order, dict.fromkeys(roots, ()))
         self.needs: dict[Value, Need] = dict.fromkeys(roots, Need())
         for value in self.order[::-1]:
             need = self.needs[value]
-            for argument, literal in _uses(value):
+            for argument, literal in uses(value):
                 new = self._and(need, *literal) if literal else need
                 known = self.needs.get(argument)
                 self.needs[argument] = new if known is None else self._either(known, new)
@@ -205,7 +207,7 @@ class Guards:
         found: dict[Value, Value] = {}
         for value in self.order:
             arguments = []
-            for argument, literal in _uses(value):
+            for argument, literal in uses(value):
                 new, guard = found[argument], guards.get(argument)
                 if guard is not None and not self._is_inside(value, argument, literal, guards):
                     new = self.conditions.select(guard, new, zero)

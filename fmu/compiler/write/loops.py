@@ -103,10 +103,12 @@ def printed(
 
     has_named_places: of a short function, those that are read more than once.
     """
+    most_left = 1.0
     if is_long is None:
+        most_left = MOST_LEFT
         is_long = sum(1 for _ in all_items(chain(*sections))) >= SHORTEST
     parts = folded(sections, is_long)
-    lines = _with_loops(parts, Names(taken)) if is_long else None
+    lines = _with_loops(parts, Names(taken), most_left) if is_long else None
     if lines is None:
         lines = _short(parts, Names(taken), has_named_places)
     room = WIDTH - INDENT
@@ -132,7 +134,7 @@ def pieces(item: Item, named: Mapping[Place, Constant]) -> list[Operand]:
         for part in item.parts:
             write(part, found, named)
     else:
-        found.append("if (")
+        found.append(f"{item.keyword} (")
         write(item.condition, found, named)
         found.append(") {")
     return found
@@ -335,7 +337,9 @@ def _moved(step: int, turn: str) -> str:
     return f" {sign} {turn}" if by == 1 else f" {sign} {by} * {turn}" if by else ""
 
 
-def _with_loops(sections: list[list[Item]], names: Names) -> list[list[str]] | None:
+def _with_loops(
+    sections: list[list[Item]], names: Names, most_left: float
+) -> list[list[str]] | None:
     """Return the texts of sections with loops; None if branches gain little by them."""
     counts: Counter[str] = Counter()  # of constants by base
     numbers: dict[Constant, int] = {}
@@ -370,7 +374,7 @@ def _with_loops(sections: list[list[Item]], names: Names) -> list[list[str]] | N
                 kept[constant] = arrays[key], sizes[key]
                 sizes[key] += 1
     count = sum(1 for part in chain(*rolled) for _ in part.lines())
-    if count > MOST_LEFT * len(found) and any(isinstance(item, Block) for item in found):
+    if count > most_left * len(found) and any(isinstance(item, Block) for item in found):
         return None
     texts = [
         [text for item in items for text in item.text([""] * len(item.numbers), 0, names)]

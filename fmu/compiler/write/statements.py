@@ -70,10 +70,11 @@ class Statement:
 
 @dataclass(eq=False, slots=True)
 class Block:
-    """Statements that run if the condition holds, and others that run if it does not."""
+    """Statements that run if the condition holds, and others that run if it does not; or a loop."""
 
     condition: Operand
     bodies: tuple[list[Item], ...]
+    keyword: str = "if"
 
 
 Item = Constant | Statement | Block
