@@ -108,8 +108,8 @@ static inline real plant_sliding_friction(const struct rp_plant_parameters *p, i
         return coulomb;
     }
     const real w = v / p->stribeck_velocity[i];
-    // exp(-100) of the difference is left, and rounding leaves Fc
-    if (w > 10.0 && breakaway < 1e20 * coulomb) {
+    // exp(-49) of the difference is left, and rounding leaves Fc
+    if (w > 7.0 && breakaway < 1e5 * coulomb) {
         return coulomb;
     }
     real e = plant_stribeck_decay(w);
