@@ -144,7 +144,7 @@ def _hook() -> Schema:
     sources = names | {"items": TEXT | {"pattern": f"^{reader.CODE.pattern}$"}}
     reads = {"type": "object", "additionalProperties": names}
     lists = {"sources": sources, "indicators": names, "series": names}
-    return _table(lists | {"reads": reads}, "sources")
+    return _table(lists | {"reads": reads, "reach": TRUTH}, "sources")
 
 
 def _table(properties: dict[str, Schema], *needed: str) -> Schema:

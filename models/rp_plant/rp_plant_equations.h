@@ -280,7 +280,7 @@ static inline void plant_motion(const struct plant *plant, const int mode[2], co
     plant_mass_matrix(plant, D);
     plant_forces(plant, efforts, forces);
     for (int i = 0; i < 2; i++) {
-        if (!stuck[i]) {
+        if (!stuck[i] && stuck[1 - i]) {
             ddq[i] = forces[i] / D[i][i];
         }
     }

@@ -185,6 +185,7 @@ class Hook:
     indicators: list[str]  # variables, in the order of NAME_events
     series: list[str]  # those that may be of the model, not of a state
     reads: dict[str, list[str]]  # what discrete variables follow from between events, too
+    reach: bool  # NAME_events limits how far a series holds
 
 
 @dataclass

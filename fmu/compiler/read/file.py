@@ -138,7 +138,9 @@ def _read_hook(file: ModelFile, head: dict[str, Any]) -> None:
         if not file.calculate:
             raise ModelFileError(f"expected code with a function {file.path.stem}_calculate")
         lists = (given.get(key, []) for key in ("indicators", "series"))
-        file.hook = Hook(given["sources"], *lists, given.get("reads", {}))
+        file.hook = Hook(
+            given["sources"], *lists, given.get("reads", {}), given.get("reach", False)
+        )
         if missing := {*file.hook.series} - {*file.hook.indicators}:
             raise ModelFileError(f"series: {min(missing)} is none of indicators")
         for name in file.hook.sources:

@@ -69,7 +69,7 @@ TABLE = ("x", "y", "z", "file", "interpolation", "outside")
 MEMBERS = ("signals", "inflows", "outflows")
 TERMINAL = ("rule", "description", *MEMBERS, "terminals")
 EVENT = ("when", "while", "where", "reinit", "set")
-HOOK = ("sources", "indicators", "series", "reads")
+HOOK = ("sources", "indicators", "series", "reads", "reach")
 SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
 NO_TABLES = ("name", "description", "include", "modes", "code")
@@ -189,6 +189,7 @@ READ = {
     "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
     "field": _expect("a field of C such as damping[0]", str, FIELD.fullmatch),
     **dict.fromkeys(("sources", "indicators", "series"), LIST),
+    "reach": _expect("true or false", bool, lambda _: True),
     **dict.fromkeys(("file", "derivative_of"), TEXT),
 }  # how values of keys are read; others are expressions
 

@@ -60,7 +60,9 @@ def source(file: ModelFile) -> str:
     events = Events(file)
     followed = _followed(file, events)
     has_kinks = _has_kinks(followed) and not file.hook
-    series = Series(file.graph, *(({}, []) if has_kinks else followed), leaves(file))
+    followed = ({}, []) if has_kinks else followed
+    is_limited = file.hook is not None and file.hook.reach
+    series = Series(file.graph, *followed, leaves(file), is_limited)
     has_domains = bool(events.located) and _may_end(file)
     smooth = _smooth(file)
     parts = {

@@ -37,6 +37,9 @@ WIDE = 150  # values that move in a model whose series has elements side by side
 ALIKE = 2  # such values of a form; models with fewer gain more by blocks for their choices
 VANISHING = 5  # factors of a product whose zero may have as many orders as the shortest series
 COST_OF_SUM = 10  # of products in a coefficient
+FEWEST_PRODUCTS = 4  # with inputs, that are worth a branch
+ORDERS = 4  # of inputs: SERIES_INPUT_LENGTH
+USED = "inputs that values are multiplied by are used"
 FLAT = 4  # degree of divisors whose small values show in the states' own terms, not between points
 
 
@@ -47,12 +50,22 @@ class Series:
     """Rows of a series: of states by their `rates` and of `followed`, and C that writes them."""
 
     def __init__(
-        self, graph: Graph, rates: Mapping[Value, Value], followed: list[Value], leaves: Leaves
+        self,
+        graph: Graph,
+        rates: Mapping[Value, Value],
+        followed: list[Value],
+        leaves: Leaves,
+        is_limited: bool = False,
     ) -> None:
         self.graph, self.leaves = graph, leaves
+        self.is_limited = is_limited  # elsewhere, to how far it holds
         roots = [*rates.values(), *followed]
         self.is_wide = is_wide(roots, leaves.conditions)
         roots = scaled(graph, roots, self.is_wide)
+        used = [] if self.is_wide else inputs_in_products(roots)
+        if used:
+            roots = [where_used(graph, used, root) for root in roots]
+            self.leaves = leaves.but({("mode", USED): "are_used"})
         if not self.is_wide:
             became = with_guards(roots, leaves.conditions)
             roots = [became[root] for root in roots]
@@ -73,7 +86,9 @@ class Series:
             self.columns = {value: i for i, value in enumerate(own)}
         self.row_count = len(self.rows) + len(self.columns)
         self.row_of_followed = [self.rows.get(value, 0) for value in roots[len(rates) :]]
-        self.still = Code(leaves)  # what does not move
+        self.still = Code(self.leaves)  # what does not move
+        if used:
+            self.still.statements.append(self._are_used(used))
         self.first = Code(self.leaves_at("0"), self.still)
         self.start = Code(self.leaves_at("0"), self.still)
         self.start.known |= {value: self._row(value, "0") for value in needed}
@@ -100,6 +115,13 @@ class Series:
                 last = "if", ("==", "k", "1"), ("*", "h", self.still.of(rate)), 0.0
             self.integrals.append(store(Place("row[", i, "][k]"), last))
 
+    def _are_used(self, used: list[Value]) -> Statement:
+        """Say whether inputs that factors are multiplied by are 0 in all orders."""
+        keys = [key for key in self.leaves if key[0] == "input"]
+        numbers = [keys.index((u.op, u.name)) for u in used]
+        orders = [f"origin->inputs[{i}][{k}] != 0.0" for i in numbers for k in range(ORDERS)]
+        return Statement((f"const bool are_used = {' || '.join(orders)};",))
+
     def _write_all(self, needed: list[Value]) -> None:
         """Write all rows in the order of the values."""
         targets = {place: value for value in needed for place in self.places(value, "0")}
@@ -119,11 +141,10 @@ class Series:
         """Write rows in the branches that need them."""
         self.first = AtOrigin(self, needed)
         hidden = {v for pair in self._inner() for v in pair if self.opened.path(v)}
-        zeros = [store(self._row(v, "k"), 0.0) for v in hidden]
-        clear = [Block("int k = 0; k < SERIES_LENGTH; k++", (zeros,), "for")] * bool(zeros)
-        self.first.statements = [*clear, *Blocks(self.first, plan).written()[1]]
+        zeros = {k: [store(self._row(v, k), 0.0) for v in hidden] for k in ("0", "k")}
+        self.first.statements = [*zeros["0"], *Blocks(self.first, plan).written()[1]]
         moving = replace(plan, choices=[choice for choice in plan.choices if choice.moves])
-        self.later.statements = Blocks(OfOrder(self), moving).written()[1]
+        self.later.statements = [*zeros["k"], *Blocks(OfOrder(self), moving).written()[1]]
         self.opened.write(self.still, self.condition, moves=False)
         self.opened.write(self.start, self.condition, moves=True)
 
@@ -162,6 +183,8 @@ class Series:
         return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in self._inner()]
 
     def _inner(self) -> list[tuple[Value, Value]]:
+        if self.is_limited:
+            return []
         values = (value for value in self.columns or self.rows)
         return [(value, argument) for value in values for argument in self._arguments(value)]
 
@@ -422,6 +445,29 @@ def is_wide(roots: list[Value], conditions: Conditions) -> bool:
         return True
     became = with_guards(roots, conditions)
     return not Plan.of([became[root] for root in roots]).choices
+
+
+def inputs_in_products(roots: Iterable[Value]) -> list[Value]:
+    """Return inputs by which values that move are multiplied, if many products have them."""
+    products = [
+        [x for x in value.arguments if x.op == "input"]
+        for value in in_order(roots)
+        if value.op == "*" and all(x.moves for x in value.arguments)
+    ]
+    found = [x for inputs in products for x in inputs]
+    return [*dict.fromkeys(found)] if len(found) >= FEWEST_PRODUCTS else []
+
+
+def where_used(graph: Graph, used: Iterable[Value], root: Value) -> Value:
+    """Leave out products with inputs where these are 0 in all orders."""
+    are_used, zero, found = graph.value("mode", name=USED), graph.number(0.0), {}
+    for value in in_order([root]):
+        given = [found[x] for x in value.arguments]
+        new = graph.value(value.op, *given, name=value.name, number=value.number)
+        if value.op == "*" and all(x.moves for x in given) and {*given} & {*used}:
+            new = graph.value("if", are_used, new, zero)
+        found[value] = new
+    return found[root]
 
 
 def multiplied(factor: Operand, term: Operand) -> Operand:
