@@ -1,50 +1,50 @@
 /* The Jacobian that the implicit method gets from the model, and the evaluations it saves. */
 #include "history.h"
 #include "one_instance.h"
-#include "oscillator_by_hand.h"
+#include "oscillator.h"
 
 /* The oscillator with a spring that depends on position, time and input, and with damping:
  * x'' = -omega^2 (1 + t + u) sin x - gain x'. */
-static double stiffness(const struct oscillator_values *values, double t, double u) {
-    return values->omega * values->omega * (1.0 + t + u);
+static double stiffness(const struct equations_values *values, double t, double u) {
+    return values->v_omega * values->v_omega * (1.0 + t + u);
 }
 
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
-    const struct oscillator_values *values = values_pointer;
+    const struct equations_values *values = values_pointer;
     dx[0] = x[1];
-    dx[1] = -stiffness(values, t, u[0]) * sin(x[0]) - values->gain * x[1];
+    dx[1] = -stiffness(values, t, u[0]) * sin(x[0]) - values->v_gain * x[1];
     return STATUS_OK;
 }
 
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
-    const struct oscillator_values *values = values_pointer;
+    const struct equations_values *values = values_pointer;
     J[0] = 0.0;
     J[1] = -stiffness(values, t, u[0]) * cos(x[0]);
     J[2] = 1.0;
-    J[3] = -values->gain;
+    J[3] = -values->v_gain;
     return STATUS_OK;
 }
 
 static struct model model;
-static struct model_description model_description;
+static struct model_description altered_description;
 
 void setUp(void) {
-    model = oscillator_model;
+    model = equations_model;
     model.right_hand_side = right_hand_side;
     model.jacobian = jacobian;
-    model_description = oscillator_description;
-    model_description.model = &model;
+    altered_description = model_description;
+    altered_description.model = &model;
 }
 
 static const double start = 5.0; /* s */
 
 static void begin(int method, double omega, double gain) {
-    create(&model_description);
-    set_int(OSCILLATOR_SOLVER_METHOD, method);
-    set(OSCILLATOR_OMEGA, omega);
-    set(OSCILLATOR_GAIN, gain);
+    create(&altered_description);
+    set_int(OSCILLATOR_solver_method, method);
+    set(OSCILLATOR_omega, omega);
+    set(OSCILLATOR_gain, gain);
     initialize_at(start);
 }
 
@@ -58,16 +58,16 @@ static struct { double omega, t, u, slope; } expected;
 
 static int jacobians;
 
-static void assert_expected(const struct oscillator_values *values, double t, double u) {
-    TEST_ASSERT_TRUE(values->omega == expected.omega);
+static void assert_expected(const struct equations_values *values, double t, double u) {
+    TEST_ASSERT_TRUE(values->v_omega == expected.omega);
     TEST_ASSERT_DOUBLE_WITHIN(1e-13, expected.u + expected.slope * (t - expected.t), u);
 }
 
 static enum status watched_rhs(const void *values_pointer, double t, const double x[],
                                const double u[], double dx[]) {
-    const struct oscillator_values *values = values_pointer;
+    const struct equations_values *values = values_pointer;
     assert_expected(values, t, u[0]);
-    latest.omega = values->omega;
+    latest.omega = values->v_omega;
     latest.t = t;
     memcpy(latest.x, x, sizeof latest.x);
     latest.u = u[0];
@@ -76,10 +76,10 @@ static enum status watched_rhs(const void *values_pointer, double t, const doubl
 
 static enum status watched_jacobian(const void *values_pointer, double t, const double x[],
                                     const double u[], double J[]) {
-    const struct oscillator_values *values = values_pointer;
+    const struct equations_values *values = values_pointer;
     jacobians++;
     assert_expected(values, t, u[0]);
-    TEST_ASSERT_TRUE(t == latest.t && u[0] == latest.u && values->omega == latest.omega);
+    TEST_ASSERT_TRUE(t == latest.t && u[0] == latest.u && values->v_omega == latest.omega);
     TEST_ASSERT_EQUAL_MEMORY(latest.x, x, sizeof latest.x);
     return jacobian(values, t, x, u, J);
 }
@@ -98,16 +98,16 @@ static void run_watched(int method) {
     for (int i = 0; i < 64; i++) {
         if (i % 4 == 1) {
             expected.u = 0.25 * (i % 5) + 0.125;
-            set(OSCILLATOR_U, expected.u);
+            set(OSCILLATOR_u, expected.u);
         }
         expected.t = start + i * h;
         expected.slope = i % 4 == 3 ? 3.0 : 0.0;
         if (expected.slope != 0.0) {
-            set_input_derivative(OSCILLATOR_U, 1, expected.slope);
+            set_input_derivative(OSCILLATOR_u, 1, expected.slope);
         }
         if (i == 32) {
             expected.omega = 3.0;
-            set(OSCILLATOR_OMEGA, expected.omega);
+            set(OSCILLATOR_omega, expected.omega);
         }
         ASSERT_OK(instance_do_step(instance, expected.t, h, NULL));
     }
@@ -116,7 +116,7 @@ static void run_watched(int method) {
 static void test_it_is_taken_where_the_right_hand_side_was(void) {
     run_watched(INTEGRATOR_CVODE_BDF);
     TEST_ASSERT_GREATER_THAN_INT(32, jacobians);
-    TEST_ASSERT_LESS_THAN_INT(get_int(OSCILLATOR_EVALUATIONS) / 2, jacobians);
+    TEST_ASSERT_LESS_THAN_INT(get_int(OSCILLATOR_solver_rhs_evaluations) / 2, jacobians);
 }
 
 static void test_explicit_methods_do_without(void) {
@@ -155,16 +155,16 @@ static int evaluations(enum status with(const void *values, double t, const doub
                                         const double u[], double J[])) {
     model.jacobian = with;
     begin(INTEGRATOR_CVODE_BDF, 100.0, 2000.0);
-    set(OSCILLATOR_U, 1.0);
+    set(OSCILLATOR_u, 1.0);
     const enum status status = instance_do_step(instance, start, 1.0, NULL);
     TEST_ASSERT_TRUE(status == STATUS_OK || (with != jacobian && status == STATUS_TOO_MANY_STEPS));
-    return get_int(OSCILLATOR_EVALUATIONS);
+    return get_int(OSCILLATOR_solver_rhs_evaluations);
 }
 
 /* With the right one nearly every step takes one evaluation. */
 static void test_a_wrong_one_shows_in_the_evaluations(void) {
     const int right = evaluations(jacobian);
-    TEST_ASSERT_LESS_THAN_INT(get_int(OSCILLATOR_STEPS) * 11 / 10, right);
+    TEST_ASSERT_LESS_THAN_INT(get_int(OSCILLATOR_solver_steps) * 11 / 10, right);
     TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(late_jacobian));
     TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(transposed_jacobian));
     TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(no_jacobian));
@@ -174,8 +174,8 @@ static void test_a_wrong_one_shows_in_the_evaluations(void) {
  * was asked for last. */
 static void test_inputs_are_those_of_the_jacobians_time(void) {
     begin(INTEGRATOR_CVODE_BDF, 3.0, 0.5);
-    set(OSCILLATOR_U, 0.25);
-    set_input_derivative(OSCILLATOR_U, 1, 2.0);
+    set(OSCILLATOR_u, 0.25);
+    set_input_derivative(OSCILLATOR_u, 1, 2.0);
     ASSERT_OK(instance_do_step(instance, start, 0.5, NULL));
     const double x[2] = {0.3, -0.1};
     double dx[2];

@@ -4,14 +4,14 @@
 
 #include "history.h"
 #include "one_instance.h"
-#include "oscillator_by_hand.h"
+#include "oscillator.h"
 #include "state.h"
 
 static struct instance_state state; /* of an instance that has taken a step */
 static char block[1024];
 
 void setUp(void) {
-    create(&oscillator_description);
+    create(&model_description);
     initialize_of(instance, 0.0, 10.0);
     ASSERT_OK(instance_do_step(instance, 0.0, 0.5, NULL));
     ASSERT_OK(instance_do_step(instance, 0.5, 0.5, NULL));
@@ -159,7 +159,7 @@ static void test_a_history_does_not_contradict_itself(void) {
 /* A history that does not reach its first time in the steps it names cannot be replayed, though it
  * would reach its latest time from there. */
 static void test_a_history_that_is_too_short_is_found_at_the_next_step(void) {
-    struct instance *forged = created(&oscillator_description);
+    struct instance *forged = created(&model_description);
     initialize_of(forged, 0.0, INFINITY);
     ASSERT_OK(instance_do_step(forged, 0.0, 0.5, NULL));
     const long needed = forged->state.statistics.steps;
@@ -176,22 +176,22 @@ static char *place(const void *own) {
 }
 
 static void test_values_could_have_been_set(void) {
-    struct oscillator_values *values = (void *)place(instance->memory.values);
-    struct oscillator_values *held = (void *)place(instance->memory.restart_values);
+    struct equations_values *values = (void *)place(instance->memory.values);
+    struct equations_values *held = (void *)place(instance->memory.restart_values);
     const double omegas[2] = {-10.0, 100.0};
     const double no_omegas[2] = {-10.5, 100.5};
-    check_real(&values->omega, "omega", omegas, no_omegas);
-    check_real(&held->omega, "omega", omegas, no_omegas);
+    check_real(&values->v_omega, "omega", omegas, no_omegas);
+    check_real(&held->v_omega, "omega", omegas, no_omegas);
     const double finite[2] = {-1e300, 1e300};
     const double infinite[2] = {-INFINITY, INFINITY};
-    check_real(&values->x, "x = ", finite, infinite);
-    check_real(&held->v, "v = ", finite, infinite);
+    check_real(&values->v_x, "x = ", finite, infinite);
+    check_real(&held->v_v, "v = ", finite, infinite);
 
     // calculated values are not read, and held values only with a history
-    values->energy = held->energy = NAN;
+    values->v_energy = held->v_energy = NAN;
     TEST_ASSERT_TRUE(is_plausible());
     state.has_history = false;
-    held->v = NAN;
+    held->v_v = NAN;
     TEST_ASSERT_TRUE(is_plausible());
 }
 
@@ -227,12 +227,12 @@ static void check_twin(double *value, const char *name) {
 
 static void test_what_stands_twice_agrees(void) {
     check_twin(&state.own.last_event_time, "last_event_time"); // there has been no event
-    const struct oscillator_values *values = (void *)place(instance->memory.values);
+    const struct equations_values *values = (void *)place(instance->memory.values);
     struct polynomial *current = (void *)place(instance->memory.current_inputs);
-    TEST_ASSERT_EQUAL_MEMORY(&values->u, &current->d[0], sizeof current->d[0]);
+    TEST_ASSERT_EQUAL_MEMORY(&values->v_u, &current->d[0], sizeof current->d[0]);
     check_twin(&current->d[0], "two values of u");
-    struct oscillator_values *held = (void *)place(instance->memory.restart_values);
-    check_twin(&held->gain, "gain");
+    struct equations_values *held = (void *)place(instance->memory.restart_values);
+    check_twin(&held->v_gain, "gain");
 }
 
 static void test_the_clock_and_the_history_agree(void) {

@@ -3,7 +3,7 @@
 #include "clock.h"
 #include "each_method.h"
 #include "one_instance.h"
-#include "oscillator_by_hand.h"
+#include "oscillator.h"
 #include "snapshot.h"
 
 #include <stdint.h>
@@ -17,29 +17,29 @@ static unsigned series_begun;
 static enum status watched_rhs(const void *values, double t, const double x[], const double u[],
                                double dx[]) {
     latest = fmax(latest, t);
-    return oscillator_model.right_hand_side(values, t, x, u, dx);
+    return equations_model.right_hand_side(values, t, x, u, dx);
 }
 
 static enum status watched_extend(const struct series_origin *origin, int first, int last,
                                   double row[][SERIES_LENGTH]) {
     latest = fmax(latest, origin->t);
     series_begun += first == 0 ? 1 : 0;
-    return oscillator_model.series->extend(origin, first, last, row);
+    return equations_model.series->extend(origin, first, last, row);
 }
 
 static struct instance *watched(void) {
     static struct series series;
     static struct model model;
-    static struct model_description model_description;
-    const unsigned reference = OSCILLATOR_SOLVER_METHOD;
-    model = oscillator_model;
+    static struct model_description altered_description;
+    const unsigned reference = OSCILLATOR_solver_method;
+    model = equations_model;
     model.right_hand_side = watched_rhs;
-    series = *oscillator_model.series;
+    series = *equations_model.series;
     series.extend = watched_extend;
     model.series = &series;
-    model_description = oscillator_description;
-    model_description.model = &model;
-    struct instance *made = created(&model_description);
+    altered_description = model_description;
+    altered_description.model = &model;
+    struct instance *made = created(&altered_description);
     ASSERT_OK(instance_set_integer(made, &reference, 1, &method));
     return made;
 }
@@ -56,23 +56,23 @@ static void begin_anew(void) {
 }
 
 static void get_states(struct instance *from, double states[2]) {
-    states[0] = get_of(from, OSCILLATOR_X);
-    states[1] = get_of(from, OSCILLATOR_V);
+    states[0] = get_of(from, OSCILLATOR_x);
+    states[1] = get_of(from, OSCILLATOR_v);
 }
 
 EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
     initialize_at(0.0);
     for (int i = 0; i < 50; i++) {
-        set(OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0);
+        set(OSCILLATOR_u, i % 2 == 0 ? 0.0 : -0.0);
         ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01, NULL));
     }
-    const int alternating = get_int(OSCILLATOR_STEPS);
+    const int alternating = get_int(OSCILLATOR_solver_steps);
     begin_anew();
     initialize_at(0.0);
     for (int i = 0; i < 50; i++) {
         ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01, NULL));
     }
-    TEST_ASSERT_EQUAL_INT(get_int(OSCILLATOR_STEPS), alternating);
+    TEST_ASSERT_EQUAL_INT(get_int(OSCILLATOR_solver_steps), alternating);
 }
 
 /* ---- Beyond communication points ------------------------------------------------------------ */
@@ -93,7 +93,7 @@ EACH_METHOD static void test_no_internal_step_passes_the_stop_time(void) {
         TEST_ASSERT_TRUE(latest <= stops[i] * (1.0 + 1e-12));
         // a series is evaluated where a step begins
         TEST_ASSERT_TRUE(method == INTEGRATOR_TAYLOR || latest >= stops[i] * (1.0 - 1e-12));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(OSCILLATOR_X));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(OSCILLATOR_x));
     }
 }
 
@@ -128,7 +128,7 @@ EACH_METHOD static void test_no_internal_step_passes_the_end_of_a_polynomial(voi
     step_held(1024, h);
     for (int i = 1024; i < 1100; i++) {
         latest = -INFINITY;
-        set_input_derivative(OSCILLATOR_U, 1, 0.5);
+        set_input_derivative(OSCILLATOR_u, 1, 0.5);
         ASSERT_OK(instance_do_step(instance, i * h, h, NULL));
         TEST_ASSERT_TRUE(latest <= (i + 1) * h * (1.0 + 1e-12));
     }
@@ -144,13 +144,13 @@ EACH_METHOD static void test_a_new_parameter_makes_a_new_instance(void) {
     step_held(1024, h);
     get_states(instance, states);
     struct instance *fresh = watched();
-    set_of(fresh, OSCILLATOR_X, states[0]);
-    set_of(fresh, OSCILLATOR_V, states[1]);
-    set_of(fresh, OSCILLATOR_OMEGA, 3.0);
-    set_of(fresh, OSCILLATOR_U, 1.5);
+    set_of(fresh, OSCILLATOR_x, states[0]);
+    set_of(fresh, OSCILLATOR_v, states[1]);
+    set_of(fresh, OSCILLATOR_omega, 3.0);
+    set_of(fresh, OSCILLATOR_u, 1.5);
     initialize_of(fresh, 1.0, 4.0);
-    set(OSCILLATOR_OMEGA, 3.0);
-    set(OSCILLATOR_U, 1.5);
+    set(OSCILLATOR_omega, 3.0);
+    set(OSCILLATOR_u, 1.5);
     for (int i = 1024; i < 2048; i++) {
         ASSERT_OK(instance_do_step(instance, i * h, h, NULL));
         ASSERT_OK(instance_do_step(fresh, i * h, h, NULL));
@@ -180,13 +180,13 @@ static double error_with_jumps(double tolerance, double jump, int every) {
     double error = 0.0;
     double scale = 0.0;
     begin_anew();
-    set(OSCILLATOR_RELATIVE_TOLERANCE, tolerance);
+    set(OSCILLATOR_relative_tolerance, tolerance);
     initialize_at(0.0);
     for (int i = 0; i < 1000; i++) {
         if (i % every == 0) {
             u = 1.0 + jump * random_sign(&random);
         }
-        set(OSCILLATOR_U, u);
+        set(OSCILLATOR_u, u);
         ASSERT_OK(instance_do_step(instance, i * h, h, NULL));
         oscillator_solution(2.0, u, h, exact, exact);
         get_states(instance, states);
@@ -227,22 +227,22 @@ EACH_METHOD static void test_a_step_that_rounds_to_none_is_refused(void) {
 /* A nominal value sets the scale of the absolute tolerance: the larger, the fewer internal steps
  * where the state is small. */
 static int steps_with_nominal(double nominal) {
-    struct variable variables[16];
-    struct model_description description = oscillator_description;
+    struct variable variables[32];
+    struct model_description description = model_description;
     struct instance *scaled = NULL;
-    const unsigned steps_reference = OSCILLATOR_STEPS;
-    const unsigned method_reference = OSCILLATOR_SOLVER_METHOD;
+    const unsigned steps_reference = OSCILLATOR_solver_steps;
+    const unsigned method_reference = OSCILLATOR_solver_method;
     int steps = 0;
-    for (size_t i = 0; i < oscillator_description.variable_count; i++) {
-        variables[i] = oscillator_description.variables[i];
-        if (variables[i].reference == OSCILLATOR_X || variables[i].reference == OSCILLATOR_V) {
+    for (size_t i = 0; i < model_description.variable_count; i++) {
+        variables[i] = model_description.variables[i];
+        if (variables[i].reference == OSCILLATOR_x || variables[i].reference == OSCILLATOR_v) {
             variables[i].nominal = nominal;
         }
     }
     description.variables = variables;
     ASSERT_OK(instance_create(&description, &last_text_sink, &scaled));
     ASSERT_OK(instance_set_integer(scaled, &method_reference, 1, &method));
-    set_of(scaled, OSCILLATOR_X, 1e-6);
+    set_of(scaled, OSCILLATOR_x, 1e-6);
     initialize_of(scaled, 0.0, INFINITY);
     ASSERT_OK(instance_do_step(scaled, 0.0, 10.0, NULL));
     ASSERT_OK(instance_get_integer(scaled, &steps_reference, 1, &steps));
@@ -260,17 +260,17 @@ EACH_CVODE_METHOD static void test_a_restart_finds_its_first_step_without_evalua
     const double x = 0.5;
     initialize_of(instance, 0.0, INFINITY);
     ASSERT_OK(instance_do_step(instance, 0.0, 2.0, NULL));
-    const int before = get_int(OSCILLATOR_EVALUATIONS);
-    set(OSCILLATOR_U, x);
+    const int before = get_int(OSCILLATOR_solver_rhs_evaluations);
+    set(OSCILLATOR_u, x);
     ASSERT_OK(instance_do_step(instance, 2.0, 1e-6, NULL));
-    const int restarted = get_int(OSCILLATOR_EVALUATIONS) - before;
+    const int restarted = get_int(OSCILLATOR_solver_rhs_evaluations) - before;
 
-    set_of(fresh, OSCILLATOR_X, get(OSCILLATOR_X));
-    set_of(fresh, OSCILLATOR_V, get(OSCILLATOR_V));
-    set_of(fresh, OSCILLATOR_U, x);
+    set_of(fresh, OSCILLATOR_x, get(OSCILLATOR_x));
+    set_of(fresh, OSCILLATOR_v, get(OSCILLATOR_v));
+    set_of(fresh, OSCILLATOR_u, x);
     initialize_of(fresh, 0.0, INFINITY);
     ASSERT_OK(instance_do_step(fresh, 0.0, 1e-6, NULL));
-    const unsigned reference = OSCILLATOR_EVALUATIONS;
+    const unsigned reference = OSCILLATOR_solver_rhs_evaluations;
     int evaluations = 0;
     ASSERT_OK(instance_get_integer(fresh, &reference, 1, &evaluations));
     TEST_ASSERT_LESS_THAN_INT(evaluations, restarted);
@@ -289,7 +289,7 @@ static unsigned asked;
 
 static enum status set_cubic(void *context, double time) {
     asked++;
-    set(OSCILLATOR_U, cubic(time));
+    set(OSCILLATOR_u, cubic(time));
     return STATUS_OK;
 }
 
@@ -309,18 +309,18 @@ static double solution(double time) {
 EACH_METHOD static void test_a_cubic_input_is_exact(void) {
     const struct step_options options = {.ask_inputs = set_cubic};
     asked = 0;
-    set(OSCILLATOR_MAX_STEP, 0.25); // so that all methods need some steps
+    set(OSCILLATOR_max_step, 0.25); // so that all methods need some steps
     initialize_at(1.0);
     for (int i = 0; i < 4; i++) {
         ASSERT_OK(instance_do_step(instance, 1.0 + 0.25 * i, 0.25, &options));
-        TEST_ASSERT_TRUE(get(OSCILLATOR_U) == cubic(1.25 + 0.25 * i));
+        TEST_ASSERT_TRUE(get(OSCILLATOR_u) == cubic(1.25 + 0.25 * i));
     }
     TEST_ASSERT_EQUAL_UINT(4 * POLYNOMIAL_NODES, asked);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, solution(2.0), get(OSCILLATOR_X));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, solution(2.0), get(OSCILLATOR_x));
     // afterwards it is held at its last value
-    const double held = get(OSCILLATOR_U);
+    const double held = get(OSCILLATOR_u);
     ASSERT_OK(instance_do_step(instance, 2.0, 0.25, NULL));
-    TEST_ASSERT_TRUE(held == get(OSCILLATOR_U));
+    TEST_ASSERT_TRUE(held == get(OSCILLATOR_u));
 }
 
 static unsigned report_count;
@@ -329,7 +329,7 @@ static double last_report; /* s */
 /* At the third one the step is to end at 90 s. */
 static enum status note(void *context, double time, double *end) {
     TEST_ASSERT_TRUE(time > last_report && time <= *end);
-    TEST_ASSERT_TRUE(get(OSCILLATOR_TIME) == time);
+    TEST_ASSERT_TRUE(get(OSCILLATOR_time) == time);
     last_report = time;
     if (++report_count == 3) {
         *end = 90.0;
@@ -340,7 +340,7 @@ static enum status note(void *context, double time, double *end) {
 /* Asked for the end of internal steps, a step may take as many of them as without. */
 EACH_METHOD static void test_the_limit_of_internal_steps_holds_over_early_ends(void) {
     const struct step_options noting = {.accept = note};
-    set_int(OSCILLATOR_MAX_STEPS, 12);
+    set_int(OSCILLATOR_max_internal_steps, 12);
     initialize_at(1.0);
     report_count = 0;
     last_report = 1.0;
@@ -368,11 +368,11 @@ EACH_METHOD static void test_messages_have_the_time_of_the_simulation(void) {
     tearDown();
     times_said = 0;
     ASSERT_OK(instance_create(description, &sink, &instance));
-    set_int(OSCILLATOR_SOLVER_METHOD, method);
-    set_int(OSCILLATOR_MAX_STEPS, 12);
+    set_int(OSCILLATOR_solver_method, method);
+    set_int(OSCILLATOR_max_internal_steps, 12);
     initialize_at(1000.0);
     ASSERT_OK(instance_do_step(instance, 1000.0, 1e-6, NULL));
-    set(OSCILLATOR_U, 1.0); // a restart
+    set(OSCILLATOR_u, 1.0); // a restart
     const double t = instance_time(instance);
     TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, t, 99.0, NULL));
     TEST_ASSERT_GREATER_THAN_UINT(0, times_said);

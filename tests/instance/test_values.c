@@ -2,10 +2,10 @@
  * and by directions; a model that fails to compute them. */
 #include "continuous_states.h"
 #include "one_instance.h"
-#include "oscillator_by_hand.h"
+#include "oscillator.h"
 
 void setUp(void) {
-    create(&oscillator_description);
+    create(&model_description);
     setup(instance, 0.0, INFINITY);
     ASSERT_OK(instance_enter_initialization(instance));
 }
@@ -19,10 +19,10 @@ static void collect(void *context, enum status status, const char *text) {
 
 /* The first row is checked as all others: tests/wheel/test_wheel.c. */
 static void test_a_wrong_field_in_the_first_row_is_refused(void) {
-    struct variable variable = oscillator_description.variables[1]; // omega, a parameter
-    struct model_description wrong = oscillator_description;
+    struct variable variable = model_description.variables[1]; // omega, a parameter
+    struct model_description wrong = model_description;
     struct instance *none = instance;
-    variable.offset = offsetof(struct oscillator_values, energy);
+    variable.offset = offsetof(struct equations_values, v_energy);
     wrong.variables = &variable;
     wrong.variable_count = 1;
     const struct message_sink sink = {.write = collect};
@@ -35,12 +35,12 @@ static void test_a_wrong_field_in_the_first_row_is_refused(void) {
 /* Nominal values are found wherever in the table a state stands. */
 static void test_nominal_values_of_states_in_the_first_rows(void) {
     struct variable rows[2];
-    struct model_description states_only = oscillator_description;
+    struct model_description states_only = model_description;
     struct instance *made = NULL;
     double nominals[2] = {0.0, 0.0};
-    for (size_t i = 0, row = 0; i < oscillator_description.variable_count; i++) {
-        const struct variable *variable = &oscillator_description.variables[i];
-        if (variable->reference == OSCILLATOR_X || variable->reference == OSCILLATOR_V) {
+    for (size_t i = 0, row = 0; i < model_description.variable_count; i++) {
+        const struct variable *variable = &model_description.variables[i];
+        if (variable->reference == OSCILLATOR_x || variable->reference == OSCILLATOR_v) {
             rows[row] = *variable;
             rows[row].nominal = 5.0 + (double)row;
             row++;
@@ -57,11 +57,11 @@ static void test_nominal_values_of_states_in_the_first_rows(void) {
 
 /* What was calculated before a reset does not show after it. */
 static void test_calculated_values_follow_a_reset(void) {
-    const double fresh = get(OSCILLATOR_ENERGY);
-    set(OSCILLATOR_X, 3.0);
-    TEST_ASSERT_TRUE(get(OSCILLATOR_ENERGY) > fresh);
+    const double fresh = get(OSCILLATOR_energy);
+    set(OSCILLATOR_x, 3.0);
+    TEST_ASSERT_TRUE(get(OSCILLATOR_energy) > fresh);
     instance_reset(instance);
-    TEST_ASSERT_TRUE(get(OSCILLATOR_ENERGY) == fresh);
+    TEST_ASSERT_TRUE(get(OSCILLATOR_energy) == fresh);
 }
 
 /* ---- Derivatives ---------------------------------------------------------------------------- */
@@ -76,32 +76,32 @@ static double derivative(unsigned reference, int order) {
 static void test_a_value_set_after_a_moving_step_has_no_slope(void) {
     const double w = 2.0;
     ASSERT_OK(instance_exit_initialization(instance));
-    set_input_derivative(OSCILLATOR_U, 1, 3.0);
+    set_input_derivative(OSCILLATOR_u, 1, 3.0);
     ASSERT_OK(instance_do_step(instance, 0.0, 0.5, NULL));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_V) + 3.0, derivative(OSCILLATOR_A, 1));
-    set(OSCILLATOR_U, 0.25);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_V), derivative(OSCILLATOR_A, 1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_v) + 3.0, derivative(OSCILLATOR_a, 1));
+    set(OSCILLATOR_u, 0.25);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_v), derivative(OSCILLATOR_a, 1));
 }
 
 /* Once anything of an input is set after a step over which it moved, outputs answer for the input
  * that the next step will have: the value set last with the new derivatives. */
 static void test_new_derivatives_start_from_the_value_set_last(void) {
     ASSERT_OK(instance_exit_initialization(instance));
-    set_input_derivative(OSCILLATOR_U, 1, 3.0);
-    set_input_derivative(OSCILLATOR_U, 2, -8.0);
+    set_input_derivative(OSCILLATOR_u, 1, 3.0);
+    set_input_derivative(OSCILLATOR_u, 2, -8.0);
     ASSERT_OK(instance_do_step(instance, 0.0, 0.5, NULL));
-    set_input_derivative(OSCILLATOR_U, 1, 5.0);
-    const double x = get(OSCILLATOR_X);
-    TEST_ASSERT_EQUAL_DOUBLE(-4.0 * x, get(OSCILLATOR_A));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -4.0 * get(OSCILLATOR_V) + 5.0, derivative(OSCILLATOR_A, 1));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -4.0 * get(OSCILLATOR_A), derivative(OSCILLATOR_A, 2));
+    set_input_derivative(OSCILLATOR_u, 1, 5.0);
+    const double x = get(OSCILLATOR_x);
+    TEST_ASSERT_EQUAL_DOUBLE(-4.0 * x, get(OSCILLATOR_a));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -4.0 * get(OSCILLATOR_v) + 5.0, derivative(OSCILLATOR_a, 1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -4.0 * get(OSCILLATOR_a), derivative(OSCILLATOR_a, 2));
 }
 
 static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
-    const unsigned x = OSCILLATOR_X;
-    const unsigned omega = OSCILLATOR_OMEGA;
-    const unsigned energy = OSCILLATOR_ENERGY;
-    const unsigned setting = OSCILLATOR_EFFECTIVE_TOLERANCE;
+    const unsigned x = OSCILLATOR_x;
+    const unsigned omega = OSCILLATOR_omega;
+    const unsigned energy = OSCILLATOR_energy;
+    const unsigned setting = OSCILLATOR_effective_relative_tolerance;
     const double one = 1.0;
     double value = -7.0;
     ASSERT_OK(instance_get_directional_derivative(instance, KNOWN_MOTION, &x, 1, &omega, 1, &one,
@@ -125,44 +125,44 @@ static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
  * again. */
 
 static struct model model;
-static struct model_description model_description;
+static struct model_description altered_description;
 static bool has_outputs;
 static int evaluations_left; /* before one fails */
 static bool is_infinite;     /* what derivatives are */
 
 static enum status outputs(void *values, double t) {
-    return has_outputs ? oscillator_model.outputs(values, t) : STATUS_NOT_FINITE;
+    return has_outputs ? equations_model.outputs(values, t) : STATUS_NOT_FINITE;
 }
 
 static enum status derivatives(const void *values, double t, double dt, void *first, void *second) {
     if (evaluations_left-- <= 0) {
         return STATUS_NOT_FINITE;
     }
-    const enum status status = oscillator_model.derivatives(values, t, dt, first, second);
+    const enum status status = equations_model.derivatives(values, t, dt, first, second);
     if (is_infinite) {
-        ((struct oscillator_values *)first)->energy = INFINITY;
+        ((struct equations_values *)first)->v_energy = INFINITY;
     }
     return status;
 }
 
 /* Steps an instance of the model once. */
 static void begin_failing(void) {
-    model = oscillator_model;
+    model = equations_model;
     model.outputs = outputs;
     model.derivatives = derivatives;
-    model_description = oscillator_description;
-    model_description.model = &model;
+    altered_description = model_description;
+    altered_description.model = &model;
     has_outputs = true;
     evaluations_left = 100;
     is_infinite = false;
-    create(&model_description);
+    create(&altered_description);
     initialize_at(0.0);
     ASSERT_OK(instance_do_step(instance, 0.0, 0.1, NULL));
     last_text[0] = '\0';
 }
 
-static const unsigned energy = OSCILLATOR_ENERGY;
-static const unsigned x = OSCILLATOR_X;
+static const unsigned energy = OSCILLATOR_energy;
+static const unsigned x = OSCILLATOR_x;
 
 static enum status read_energy(double *value) {
     return instance_get_real(instance, &energy, 1, value);
@@ -196,11 +196,11 @@ static void assert_works(enum status call(double *)) {
 static void test_without_outputs_only_states_are_read(void) {
     begin_failing();
     has_outputs = false;
-    set(OSCILLATOR_U, 0.5); // outputs that are valid already are not computed again
+    set(OSCILLATOR_u, 0.5); // outputs that are valid already are not computed again
     assert_fails(read_energy, "no outputs at t = 0.1");
     assert_fails(derive_energy, "no outputs at t = 0.1");
     assert_fails(derive_energy_by_x, "no outputs at t = 0.1");
-    TEST_ASSERT_TRUE(isfinite(get(OSCILLATOR_X))); // a state
+    TEST_ASSERT_TRUE(isfinite(get(OSCILLATOR_x))); // a state
     has_outputs = true;
     assert_works(read_energy);
     assert_works(derive_energy);

@@ -3,7 +3,7 @@
 #include "captured_stderr.h"
 #include "instance.h"
 #include "last_text.h"
-#include "oscillator_by_hand.h"
+#include "oscillator.h"
 #include "snapshot.h"
 #include "stepping.h"
 #include "values.h"
@@ -57,20 +57,20 @@ static enum status spoil(double *value) {
 
 static enum status right_hand_side(const void *values, double t, const double x[], const double u[],
                                    double dx[]) {
-    const enum status status = oscillator_model.right_hand_side(values, t, x, u, dx);
+    const enum status status = equations_model.right_hand_side(values, t, x, u, dx);
     return fails_now() ? spoil(&dx[1]) : status;
 }
 
 /* Of the method with Newton's iteration. */
 static enum status jacobian(const void *values, double t, const double x[], const double u[],
                             double J[]) {
-    const enum status status = oscillator_model.jacobian(values, t, x, u, J);
+    const enum status status = equations_model.jacobian(values, t, x, u, J);
     return fails_now() ? spoil(&J[1]) : status;
 }
 
 static enum status extend(const struct series_origin *origin, int first, int last,
                           double row[][SERIES_LENGTH]) {
-    const enum status status = oscillator_model.series->extend(origin, first, last, row);
+    const enum status status = equations_model.series->extend(origin, first, last, row);
     return fails_now() ? spoil(&row[1][last]) : status;
 }
 
@@ -84,22 +84,22 @@ static const double tolerance = 1e-6; /* of states, at the default of 1e-8 */
 static struct instance *create(int method) {
     static struct model model;
     static struct series series;
-    static struct model_description model_description;
+    static struct model_description altered_description;
     const struct instance_experiment experiment = {.start_time = start};
-    const unsigned reference = OSCILLATOR_SOLVER_METHOD;
+    const unsigned reference = OSCILLATOR_solver_method;
     struct instance *instance = NULL;
-    model = oscillator_model;
+    model = equations_model;
     model.right_hand_side = right_hand_side;
     model.jacobian = jacobian;
-    series = *oscillator_model.series;
+    series = *equations_model.series;
     series.extend = extend;
     model.series = &series;
-    model_description = oscillator_description;
-    model_description.model = &model;
-    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    altered_description = model_description;
+    altered_description.model = &model;
+    ASSERT_OK(instance_create(&altered_description, &last_text_sink, &instance));
     ASSERT_OK(instance_set_integer(instance, &reference, 1, &method));
     if (method == INTEGRATOR_TAYLOR) { // whose steps are long
-        const unsigned max_step = OSCILLATOR_MAX_STEP;
+        const unsigned max_step = OSCILLATOR_max_step;
         const double most = 0.0625;
         ASSERT_OK(instance_set_real(instance, &max_step, 1, &most));
     }
@@ -115,7 +115,7 @@ struct state {
 };
 
 static struct state state_of(struct instance *instance) {
-    const unsigned references[] = {OSCILLATOR_X, OSCILLATOR_V};
+    const unsigned references[] = {OSCILLATOR_x, OSCILLATOR_v};
     struct state state = {.t = instance_time(instance)};
     ASSERT_OK(instance_get_real(instance, references, 2, state.x));
     return state;
