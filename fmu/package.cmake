@@ -1,8 +1,9 @@
-# add_fmu(NAME EQUATIONS file.toml [FOLDER models/...] [LIBRARY target] [REFERENCES scenario ...] [VERSIONS fmi2 fmi3])
+# add_fmu(NAME EQUATIONS file.toml [FOLDER models/...] [LIBRARY target] [REFERENCES scenario ...] [VERSIONS fmi2 fmi3]
+#         [DESCRIPTION_ONLY])
 # add_fmu(NAME BY_HAND file.toml LIBRARY target [FOLDER models/...] ...)
 #
 # Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or the one of them that
-# VERSIONS names, from the model's file and its lock file. The folder may have a page, README.md, pictures of it, and
+# VERSIONS names, or with DESCRIPTION_ONLY no archive, from the model's file and its lock file. The folder may have a page, README.md, pictures of it, and
 # model.png. The library has the C of the hook of a file with equations or, BY_HAND, the struct model of which the file
 # declares the variables. The archive carries inputs and references of the scenarios after REFERENCES. Targets:
 #   NAME_equations             the library with the struct model of EQUATIONS
@@ -91,8 +92,8 @@ function(add_values_header target file)
 endfunction()
 
 function(add_fmu name)
-  cmake_parse_arguments(ARG "" "EQUATIONS;BY_HAND;FOLDER;LIBRARY" "REFERENCES;VERSIONS" ${ARGN})
-  if(NOT ARG_VERSIONS)
+  cmake_parse_arguments(ARG "DESCRIPTION_ONLY" "EQUATIONS;BY_HAND;FOLDER;LIBRARY" "REFERENCES;VERSIONS" ${ARGN})
+  if(NOT ARG_VERSIONS AND NOT ARG_DESCRIPTION_ONLY)
     set(ARG_VERSIONS ${FMI_VERSIONS})
   endif()
   set_property(DIRECTORY APPEND PROPERTY FMUS ${name})

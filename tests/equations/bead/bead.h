@@ -6,6 +6,8 @@ enum { UNDECIDED, FLIES, RESTS };
 
 static inline void bead_calculate(struct bead_values *values) {
     const int rests = values->mode == RESTS;
-    values->a = rests ? 0.0 : -values->parameters.g;
+    const double pull = values->parameters.g - values->lift;
+    values->a = rests ? 0.0 : -pull;
     values->way = rests ? 1.0 : values->motion[0];
+    values->load = rests ? pull : 1.0;
 }

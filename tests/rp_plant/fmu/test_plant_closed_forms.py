@@ -1,5 +1,5 @@
 """The built FMU against closed forms, with every method: rest, steep friction and stiff stops.
-test_plant_random_motions.py has motions of all kinds, events/test_state_events.c endless bounces.
+test_plant_random_motions.py has motions of all kinds, events/test_impacts.c endless bounces.
 
 One joint is held by firm friction where the form is that of the other one.
 """

@@ -1,25 +1,45 @@
-/* Runs a toy: what its tests share. */
-#ifndef TOY_RUN_H
-#define TOY_RUN_H
+/* Runs the model of a test: what the tests of events share. */
+#ifndef EVENT_RUN_H
+#define EVENT_RUN_H
 
 #include "continuous_states.h"
+#include "equations.h"
+#include "model_description.h"
 #include "one_instance.h"
 #include "serialization.h"
 #include "snapshot.h"
-#include "toy.h"
+#include "value_references.h"
+
+/* References of the variables that every model with events has. */
+static inline unsigned own(const char *name) {
+    for (size_t i = 0; i < model_description.variable_count; i++) {
+        if (strcmp(model_description.variables[i].name, name) == 0) {
+            return model_description.variables[i].reference;
+        }
+    }
+    TEST_FAIL_MESSAGE(name);
+    return 0;
+}
+
+static inline int event_count(void) {
+    return get_int(own("event_count"));
+}
+
+static inline double last_event_time(void) {
+    return get(own("last_event_time"));
+}
 
 /* With a method, at a tolerance; the experiment starts at start (s). */
-static inline void prepare_at(double start, const struct model_description *description,
+static inline void prepare_as(const struct model_description *description, double start,
                               int with_method, double tolerance) {
     create(description);
     setup(instance, start, INFINITY);
-    set_int(TOY_METHOD, with_method);
-    set(TOY_TOLERANCE, tolerance);
+    set_int(own("solver_method"), with_method);
+    set(own("relative_tolerance"), tolerance);
 }
 
-static inline void prepare(const struct model_description *description, int with_method,
-                           double tolerance) {
-    prepare_at(0.0, description, with_method, tolerance);
+static inline void prepare(int with_method, double tolerance) {
+    prepare_as(&model_description, 0.0, with_method, tolerance);
 }
 
 static inline void initialize(void) {
@@ -28,8 +48,7 @@ static inline void initialize(void) {
 }
 
 /* For an integrator outside, which begins. */
-static inline void prepare_outside(const struct model_description *description) {
-    prepare(description, 1, 1e-8);
+static inline void begin_outside(void) {
     instance_integrate_outside(instance);
     initialize();
     ASSERT_OK(instance_enter_continuous_time(instance));
@@ -42,8 +61,6 @@ static inline void run(double t, double h, int steps) {
     }
 }
 
-/* ---- Forged modes ---------------------------------------------------------------------------- */
-
 /* Serializes the instance as it is and reads the bytes. */
 static inline enum status pass_on(void) {
     struct instance_snapshot *snapshot = NULL;
@@ -55,17 +72,6 @@ static inline enum status pass_on(void) {
     ASSERT_OK(instance_serialize(instance, snapshot, bytes, size));
     last_text[0] = '\0';
     return instance_deserialize(instance, bytes, size, &read);
-}
-
-/* Brings a toy to where it moves within the integrator's history. */
-static inline void start_moving(const struct model_description *description) {
-    prepare(description, 1, 1e-8);
-    set(TOY_POSITION, 1.0);
-    set(TOY_SPEED, 2.0);
-    initialize();
-    run(0.0, 1e-3, 2);
-    TEST_ASSERT_TRUE(instance->state.has_history && get(TOY_POSITION) > 1.0 &&
-                     get_int(TOY_EVENTS) == 0);
 }
 
 /* A state with this mode, now and since the restart or now only, is refused. */
