@@ -26,11 +26,6 @@ def events(file: ModelFile) -> str:
     return f"{file.path.stem}_events" if file.hook else "events"
 
 
-def with_own_names(file: ModelFile, text: str) -> str:
-    """Return the text with the model's names of both structures."""
-    return text.replace(STRUCTURE, structure(file)).replace(SYMBOL, symbol(file))
-
-
 def parts(file: ModelFile, ranges: Mapping[str, list[Field]]) -> dict[str, list[str]]:
     """Return lines of equations.c.in; nothing without a hook. ranges: of struct model."""
     if not file.hook:
@@ -51,7 +46,7 @@ def parts(file: ModelFile, ranges: Mapping[str, list[Field]]) -> dict[str, list[
             "}",
         ],
         "side_by_side": [
-            _side_by_side(ranges[key]) for key in ("inputs", "states", "dx") if ranges[key]
+            _side_by_side(file, ranges[key]) for key in ("inputs", "states", "dx") if ranges[key]
         ],
     }
 
@@ -67,12 +62,12 @@ def modes_of_values(file: ModelFile) -> list[str]:
 
 def _in_effect(file: ModelFile, state: str, of_input: str) -> list[str]:
     call = f"{file.path.stem}_in_effect(values, {state}, {of_input}, &copy)"
-    return [f"{STRUCTURE} copy;", f"values = {call};"]
+    return [f"{structure(file)} copy;", f"values = {call};"]
 
 
-def _side_by_side(fields: list[Field]) -> str:
+def _side_by_side(file: ModelFile, fields: list[Field]) -> str:
     """Check that fields of one range follow each other."""
-    first, last = (f"offsetof({STRUCTURE}, {field})" for field in (fields[0], fields[-1]))
+    first, last = (f"offsetof({structure(file)}, {field})" for field in (fields[0], fields[-1]))
     size = f"{len(fields) - 1} * sizeof(double)"
     return f'_Static_assert({last} - {first} == {size}, "fields are side by side");'
 
@@ -80,4 +75,4 @@ def _side_by_side(fields: list[Field]) -> str:
 def parameters(file: ModelFile) -> list[str]:
     """Return the range of parameters of struct model."""
     size = f"sizeof(struct {file.path.stem}_parameters)"
-    return [f".parameters = {{offsetof({STRUCTURE}, parameters), {size}}},"]
+    return [f".parameters = {{offsetof({structure(file)}, parameters), {size}}},"]

@@ -13,7 +13,6 @@ from ..read.content import OPTIONS, ModelFile
 from . import c_hook
 from .c_code import Code
 from .c_events import Events, arrays, count, leaves, ticks
-from .c_hook import STRUCTURE
 from .c_series import Series
 from .c_text import declared, filled, indented, number, shortened, text
 from .loops import printed
@@ -75,26 +74,27 @@ def source(file: ModelFile) -> str:
         "checks": _checks(file),
         **c_hook.parts(file, _ranges(file)),
     }
-    written = filled(
+    return filled(
         "equations.c.in",
+        structure=c_hook.structure(file),
+        symbol=c_hook.symbol(file),
         **parts,
         tables=_tables(file),  # those that the parts read
         followed=_modes_of(file, events),
         expressions=_expressions(file),
         ranges=[
             *(c_hook.parameters(file) if file.hook else _parameter_lines(file)),
-            *_range_lines({k: v for k, v in _ranges(file).items() if k != "parameters"}),
+            *_range_lines(file, {k: v for k, v in _ranges(file).items() if k != "parameters"}),
         ],
         model_events=[f".events = &{c_hook.events(file)},"] if events else [],
     )
-    return c_hook.with_own_names(file, written)
 
 
 def _modes_of(file: ModelFile, events: Events) -> list[str]:
     """Statements that let `values` have the modes in effect."""
     if file.hook:
         return c_hook.modes_of_values(file)
-    return [f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else []
+    return [f"{c_hook.structure(file)} copy;", f"values = {FOLLOWED};"] if events else []
 
 
 def _expressions(file: ModelFile) -> list[str]:
@@ -102,8 +102,9 @@ def _expressions(file: ModelFile) -> list[str]:
     fields = [(file.fields.rate(x.name), x) for x in file.of("states")]
     fields += [(file.fields.value(v.name), v) for v in file.calculated_reals]
     fields += [(file.fields.count(v.name), v) for v in file.calculated_counts]
+    whole = c_hook.structure(file)
     return [
-        f"{{offsetof({STRUCTURE}, {name}), {shortened('', variable.expression, file.tables)}}},"
+        f"{{offsetof({whole}, {name}), {shortened('', variable.expression, file.tables)}}},"
         for name, variable in fields
     ] or ["{0},"]
 
@@ -142,16 +143,17 @@ def _options(file: ModelFile) -> list[Field]:
 def _parameter_lines(file: ModelFile) -> list[str]:
     doubles, ints = _ranges(file)["parameters"], _options(file)
     if not ints:
-        return _range_lines({"parameters": doubles})
+        return _range_lines(file, {"parameters": doubles})
     first = [*doubles, *ints][0]
     size = f"{len(doubles)} * sizeof(double) + {len(ints)} * sizeof(int)"
-    return [f".parameters = {{offsetof({STRUCTURE}, {first}), {size}}},"]
+    return [f".parameters = {{offsetof({c_hook.structure(file)}, {first}), {size}}},"]
 
 
-def _range_lines(ranges: Mapping[str, list[Field]]) -> list[str]:
+def _range_lines(file: ModelFile, ranges: Mapping[str, list[Field]]) -> list[str]:
     """Initializers of struct range, of fields that follow each other."""
+    whole = c_hook.structure(file)
     return [
-        f".{name} = {{offsetof({STRUCTURE}, {fields[0]}), {len(fields)} * sizeof(double)}},"
+        f".{name} = {{offsetof({whole}, {fields[0]}), {len(fields)} * sizeof(double)}},"
         for name, fields in ranges.items()
         if fields
     ]
@@ -268,7 +270,7 @@ def _domains(
     text = filled(
         "domains.c.in",
         distances=Code(leaves(file)).assign(distances).lines(),
-        ranges=_range_lines(groups),
+        ranges=_range_lines(file, groups),
         own_row=series.row_count,
         jacobian_size=jacobian_size,
         located=len(events.located),
