@@ -1,7 +1,7 @@
 """Packs all that is built for each platform but the FMUs, for an installed package: built.tar.xz.
 
 PLATFORM.json        runtime.json of the platform (runtime.cmake), with paths that begin here
-PLATFORM/            the objects and libraries it names, and motions that can be proven
+PLATFORM/            the objects and libraries it names
 project/, musl/ ...  the sources it names, the same for all, and all that these include
 playground/          the page for a browser
 """
@@ -45,7 +45,7 @@ def collect(build: Path) -> dict[str, bytes]:
         sources.add_header(header, libraries[-1])
     objects = [path for version in versions for path in version["objects"]]
     files = [*sources.origins.values(), *objects, *content["libraries"]]
-    files += [*content["licenses"].values(), *filter(Path.is_file, build.glob("proof/*"))]
+    files += content["licenses"].values()
     content["compiler"][0] = Path(content["compiler"][0]).stem
     content["options"] = [o for o in content["options"] if not o.startswith("-ffile-prefix-map")]
     relative = re.sub(

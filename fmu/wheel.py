@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from pieces import write_pieces  # noqa: E402
 
 SHARE = "rparm/share"
-OF_MODELS = (".csv", ".json", ".py", ".svg", ".toml")
+OF_MODELS = (".csv", ".h", ".json", ".py", ".svg", ".toml")
 OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/**/*.in", "fmu/*.css", "fmu/*.html")
 OF_FMU += ("src/instance/*.toml",)
 # modules that are not for a model

@@ -12,8 +12,6 @@ models/MODEL/start.toml                 values that a new scenario of the model 
 models/SYSTEM/system.svg                its components and the signals between them
 models/*/animation.py                   what of a run the report animates
 models/SYSTEM/identification.py         makes a log of the system, to identify parameters from
-build/proof/MODEL.json                  the motion of a model, which proofs enclose
-fmu/equations_to_motion.py              writes such a file, in a separate process
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
@@ -52,6 +50,7 @@ START = "start.toml"
 STUDY = "study"  # the module of a system's folder that rparm.systems.comparison describes
 IDENTIFICATION = "identification"  # module of a system's folder, read by identification.request
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
+PROVEN = ("rp_manipulator",)  # models whose references and runs are proven
 WEB = "wasm32-wasi"  # platform of FMUs for browsers
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
@@ -270,12 +269,6 @@ def fmu_of(subject: Path, option: str = "", version: str = VERSIONS[0]) -> Path:
     return built(subject, ".fmu", option, version) if subject.is_dir() else subject
 
 
-def motion_file(name: str) -> Path:
-    """Return the file with the motion of a model, which only models of equations have."""
-    folder = built_for_all() / platform_name() if INSTALLED else ROOT / "build"
-    return folder / "proof" / f"{name}.json"
-
-
 def platform_name() -> str:
     """Return FMI 3.0's name for the platform of this machine's binaries."""
     if os.name == "nt":
@@ -302,11 +295,6 @@ def page(name: str) -> Path:
 def model_builder() -> Path:
     """Return the path of the program that makes FMUs of own equations."""
     return Path(fmu_tools.__path__[0]) / "equations_to_fmu.py"
-
-
-def motion_reader() -> Path:
-    """Return the path of the program that writes the motion of a file with equations."""
-    return model_builder().with_name("equations_to_motion.py")
 
 
 def runtimes(all_platforms: bool, web: bool = False) -> list[Path]:

@@ -169,9 +169,10 @@ def _references(options: argparse.Namespace) -> Ended:
     check_writable(options.report)
     found: dict[str, ProvenReference] = {}
     rows, checked = [], 0
-    for name, program in enclosures.provers().items():
+    for name in project.PROVEN:
         folder = project.model(name)
         files = [x for x in project.scenario_files().values() if x.parents[1] == folder]
+        program = enclosures.prover_of(files[0])
         table = console.PrintedTable("reference", [x.stem for x in files], COLUMNS)
         with Fmu(project.built(folder, ".fmu")) as fmu:
             for scenario in [scenarios.load(path, fmu.model) for path in files]:

@@ -70,7 +70,7 @@ class Checker:
     def __init__(self, problem: Problem, start: Start) -> None:
         self.problem, self.steps, n = problem, 0, len(start)
         with precision(BITS):
-            none = [arb(0)] * n, [arb(0)] * len(problem.inputs), arb(problem.scenario.times[0])
+            none = [arb(0)] * n, problem.held()[0], arb(problem.scenario.times[0])
             values = self._values(*none, len(problem.nodes))
             known = [arb(value) for value, _ in start.values()]
             for i, name in enumerate(start):

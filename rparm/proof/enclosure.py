@@ -1,16 +1,12 @@
 """Intervals that contain the exact motion of a scenario; README.md has the theorems."""
 
-import json
 import math
-import subprocess
-import sys
 import time
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from flint import arb
@@ -18,6 +14,7 @@ from flint import arb
 from rparm import building, project
 from rparm.errors import UserError, one_line
 from rparm.files import is_file
+from rparm.fmu_tools.compiler.read.content import ModelFile
 from rparm.interruption import temporary_folder
 from rparm.proof.checker import Checker, WrongClaim
 from rparm.proof.problem import Problem, Start
@@ -74,13 +71,13 @@ class Enclosure:
 class Prover:
     """Proves what a model does."""
 
-    model: Mapping[str, Any]  # as `fmu/compiler/write/motion.py` has it
+    model: ModelFile
     with_outputs: bool = False  # else only states are enclosed
 
     @property
     def states(self) -> tuple[str, ...]:
         """Their names."""
-        return tuple(self.model["rates"])
+        return tuple(v.name for v in self.model.of("states"))
 
     def enclose(
         self,
@@ -134,11 +131,15 @@ class Proof:
 
     def _enclosure(self, check: bool) -> Enclosure:
         problem, times = self.problem, [float(t) for t in self.problem.scenario.times]
-        states = start_of(problem.start(self.start), [r for _, r in self.start.values()])
+        held = problem.held()
+        self.resting = problem.resting_balls(held[0])
+        start = problem.start_balls(self.start, self.resting)
+        states = start_of(start, [r for _, r in self.start.values()])
         self.stepper = Stepper(problem, states, arb(times[0]))
         self.checker = Checker(problem, self.start) if check else None
-        rows, stopped = [self._point(problem.held()[0], times[0])], None
-        for end, inputs in zip(times[1:], problem.held(), strict=True):
+        rows, stopped = [self._point(held[0], times[0])], None
+        for end, inputs in zip(times[1:], held, strict=True):
+            self.resting = problem.resting_balls(inputs)
             if time.monotonic() > self.deadline:
                 raise UserError(f"{problem.scenario.path}: the proof takes too long")
             try:
@@ -157,7 +158,7 @@ class Proof:
     def _to(self, end: float, inputs: Sequence[arb]) -> None:
         """Take, and check, all steps to a communication point."""
         at = self.stepper.at
-        for step in self.stepper.advance(end, inputs):
+        for step in self.stepper.advance(end, self.resting):
             if self.checker:
                 self.checker.step(step, at, step.length, inputs)
                 at += step.length
@@ -167,7 +168,7 @@ class Proof:
     def _point(self, inputs: Sequence[arb], at: float) -> list[Ball]:
         """Return the states and outputs, with these inputs."""
         problem, hull = self.problem, self.stepper.states.hull().entries()
-        values = problem.balls(hull, inputs, arb(at), len(problem.nodes))
+        values = problem.balls(hull, self.resting, arb(at), len(problem.nodes))
         found = [ball_of(values[node]) for node in problem.outputs]
         if self.checker:
             self.checker.point(found, inputs, at)
@@ -177,7 +178,7 @@ class Proof:
         """Return where the proof ends, and until when an event has come."""
         at, by = self.stepper.at, None
         is_event = obstacle.kind == "event"
-        step = self.stepper.crossing(obstacle.where, end, inputs) if is_event else None
+        step = self.stepper.crossing(obstacle.where, end, self.resting) if is_event else None
         if step is not None:
             if self.checker:
                 self.checker.crossing(step, at, step.length, inputs, obstacle.where)
@@ -224,17 +225,19 @@ def hull(one: Enclosure, other: Enclosure) -> Enclosure:
 
 # ---- Models --------------------------------------------------------------------------------------
 def prover_of(path: Path) -> Prover:
-    """Load the prover of a file with equations, or of the model of a scenario.
+    """Return the prover of a file with equations, or of the model of a scenario.
 
     UserError for another file, or a model that has no such file.
     """
-    if building.is_equations(path):
-        return Prover(_motion(path))
-    subject = scenarios.subject_of(path)
-    if subject.is_dir():
-        return _of_folder(subject, path)
+    subject = path if building.is_equations(path) else scenarios.subject_of(path)
     if subject.suffix.lower() == building.EQUATIONS:
-        return Prover(_motion(subject))
+        return Prover(_read(subject))
+    if subject.is_dir():
+        file = subject / f"{subject.name}{building.EQUATIONS}"
+        if not is_file(file):
+            expected = "expected a model whose motion can be proven"
+            raise UserError(f"{path}: {expected}, got {subject.name}")
+        return Prover(_read(file), subject.name in project.PROVEN)
     with zipfile.ZipFile(subject) as archive, temporary_folder() as folder:
         names = [
             n for n in archive.namelist() if n.startswith("resources/") and n.endswith(".toml")
@@ -245,40 +248,22 @@ def prover_of(path: Path) -> Prover:
         file = folder / Path(names[0]).name
         file.write_bytes(archive.read(names[0]))
         try:
-            return Prover(_motion(file))
+            return Prover(_read(file))
         except UserError as error:  # C or tables are files beside it
             way_out = f"the key fmu may name the file with equations instead of {subject.name}"
             raise UserError(f"{path}: {way_out}: {error}") from error
 
 
-def _of_folder(folder: Path, asking: Path) -> Prover:
-    """Load the prover of one of the project's models, for a scenario; UserError if it has none."""
-    known, file = provers(), folder / f"{folder.name}{building.EQUATIONS}"
-    if folder.name in known:
-        return known[folder.name]
-    if not is_file(file):
-        expected = f"expected a model whose motion can be proven ({', '.join(known) or 'none'})"
-        raise UserError(f"{asking}: {expected}, got {folder.name}")
-    return Prover(_motion(file))
+def _read(file: Path) -> ModelFile:
+    """Read a file with equations; UserError."""
+    # slow to load
+    from rparm.fmu_tools.compiler.read.model_file import ModelFileError, read
 
-
-def provers() -> dict[str, Prover]:
-    """Load the provers of models that the build has made, by the names of their folders."""
-    files = {name: project.motion_file(name) for name in project.models()}
-    return {
-        name: Prover(json.loads(file.read_bytes()), with_outputs=True)
-        for name, file in files.items()
-        if is_file(file)
-    }
-
-
-def _motion(file: Path) -> dict[str, Any]:
-    """Read a file with equations, in a separate process."""
-    project.check_installed(building.NEEDED, "build")
-    command = [sys.executable, project.motion_reader(), file]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "encoding": "utf-8"}
-    ended = subprocess.run(command, env=project.child_environment(), **pipes, check=False)
-    if ended.returncode:
-        lines = ended.stderr.strip().splitlines() or [f"ended with {ended.returncode}"]
-        raise UserError(one_line(lines[-1]))
-    return json.loads(ended.stdout)
+    try:
+        model = read(file)
+    except (ModelFileError, OSError) as error:
+        raise UserError(one_line(str(error))) from None
+    if model.hook:  # its C decides when events are
+        expected = "expected a model whose motion can be proven, got one with events in C"
+        raise UserError(f"{file}: [hook]: {expected}")
+    return model

@@ -12,7 +12,7 @@ from rparm.errors import UserError, hint
 from rparm.files import from_here
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES
-from rparm.proof.enclosure import Enclosure, Progress, provers
+from rparm.proof.enclosure import Enclosure, Progress, prover_of
 from rparm.runs import comparison, simulation
 from rparm.runs.scenario import Scenario
 from rparm.runs.simulation import Result
@@ -132,13 +132,10 @@ def errors_of_run(
     So it is without a prover, where a proof does not come to the end or takes more than
     `LONGEST_RUN` s, and for more than `most_steps` communication steps.
     """
-    if scenario.model not in project.models() or len(scenario.times) > most_steps + 1:
+    if scenario.model not in project.PROVEN or len(scenario.times) > most_steps + 1:
         return None
     try:
-        program = provers().get(scenario.model)
-        if program is None:
-            return None
-        states_only = replace(program, with_outputs=False)
+        states_only = replace(prover_of(scenario.path), with_outputs=False)
         enclosure = states_only.enclose(scenario, seconds=LONGEST_RUN)
     except UserError:  # takes too long, or what proves cannot be unpacked
         return None

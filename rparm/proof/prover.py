@@ -4,7 +4,7 @@ README.md has the theorems.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import reduce
@@ -14,7 +14,7 @@ import flint
 import numpy as np
 from flint import arb, arb_mat, arb_series
 
-from rparm.proof.problem import ARITHMETIC, Node, Problem
+from rparm.proof.problem import ARITHMETIC, Problem
 
 BITS = 128
 ACCURATE = 2.0**-104  # a remainder that is small enough: in units of the state,
@@ -31,7 +31,8 @@ ROOM, WIDE = 2.0**-8, 2.0**-3
 # what is claimed is larger, so that another theorem can confirm it: derivatives' radii, remainders,
 # and the set
 LOOSENED, ALLOWED, CONFIRMED = 1.0, 8.0, 1 + arb(2) ** -16
-ZERO, ONE, UNIT = arb(0), arb(1), arb(0, 1)
+ZERO, UNIT = arb(0), arb(0, 1)
+NONE = [ZERO] * (LAST_ORDER + 8)  # coefficients of what rests
 
 
 class Obstacle(Exception):
@@ -60,82 +61,79 @@ class Series:
     """
 
     def __init__(
-        self, problem: Problem, states: Sequence[arb], inputs: Sequence[arb], time: arb, step: arb
+        self, problem: Problem, states: Sequence[arb], resting: Sequence[arb], time: arb, step: arb
     ) -> None:
-        self.problem, self.step = problem, step
-        values = problem.balls(states, inputs, time, problem.of_series)
+        self.problem, self.step, n = problem, step, len(states)
+        values = problem.balls(states, resting, time, problem.of_series)
         bad = next((i for i, x in enumerate(values) if not x.is_finite()), None)
         if bad is not None:
-            raise Obstacle("undefined" if bad >= len(states) else "growth", bad, 0.5)
+            raise Obstacle("undefined" if bad >= n else "growth", bad, 0.5)
         self.rows = [[x] for x in values]
-        self.paces: dict[int, list[arb]] = {}  # j x_j of functions' arguments
+        for row in self.rows[n : problem.resting]:
+            row += NONE
+        self.orders = 1  # that are there
+        moving = range(problem.resting, problem.of_series)
+        self.recurrences = [(self.rows[i].append, self._recurrence(i)) for i in moving]
+        self.of_states = [(self.rows[i], self.rows[rate]) for i, rate in enumerate(problem.rates)]
 
     def extend(self) -> list[arb]:
         """Add the next order; return that of the states."""
-        nodes, rows, k = self.problem.nodes, self.rows, len(self.rows[0])
-        share, n = self.step / k, len(self.problem.states)
-        for row, rate in zip(rows[:n], self.problem.rates, strict=True):
-            row.append(rows[rate][k - 1] * share)
-        for i in range(n, self.problem.of_series):
-            op, arguments, moves, _, slope, _ = nodes[i]
-            row, found = rows[i], ZERO
-            first, second = (arguments[0], arguments[-1]) if arguments else (i, i)
-            x, y = rows[first], rows[second]
-            if not moves or (op == "time" and k > 1):
-                pass
-            elif op == "*" and nodes[first].moves and nodes[second].moves:
-                found = sum(map(mul, x, y[::-1]))
-            elif op == "*":
-                found = x[k] * y[0] if nodes[first].moves else x[0] * y[k]
-            elif op == "/":  # x = y q
-                known = sum(map(mul, y[:0:-1], row)) if nodes[second].moves else ZERO
-                found = (x[k] - known) / y[0]
-            elif slope is not None:
-                pace = self.paces.setdefault(i, [])
-                pace.append(x[k] * k)
-                found = sum(map(mul, pace, rows[slope][k - 1 :: -1])) / k
-            elif op == "time":
-                found = self.step
-            else:
-                found = ARITHMETIC[op](*(rows[j][k] for j in arguments))
-            row.append(found)
-        return [row[k] for row in rows[:n]]
+        k = self.orders
+        share = self.step / k
+        for state, rate in self.of_states:
+            state.append(rate[k - 1] * share)
+        for append, following in self.recurrences:
+            append(following(k))
+        self.orders += 1
+        return [state[k] for state, _ in self.of_states]
+
+    def _recurrence(self, place: int) -> Callable[[int], arb]:
+        """Return what calculates a node's coefficient from its arguments'."""
+        node, row, rows, step = self.problem.nodes[place], self.rows[place], self.rows, self.step
+        if node.op == "time":
+            return lambda k: step if k == 1 else ZERO
+        first, second = node.arguments[0], node.arguments[-1]
+        x, y = rows[first], rows[second]
+        match node.op:
+            case "+":
+                return lambda k: x[k] + y[k]
+            case "-":
+                return lambda k: x[k] - y[k]
+            case "negative":
+                return lambda k: -x[k]
+            case "*" if self._rests(first):
+                return lambda k: x[0] * y[k]
+            case "*" if self._rests(second):
+                return lambda k: x[k] * y[0]
+            case "*":
+                return lambda k: sum(map(mul, x, y[::-1]), ZERO)
+            case "/" if self._rests(second):
+                return lambda k: x[k] / y[0]
+            case "/":  # x = y q
+                return lambda k: (x[k] - sum(map(mul, y[:0:-1], row), ZERO)) / y[0]
+        slope, paces = rows[node.slope], []  # j x_j
+
+        def of_function(k: int) -> arb:
+            paces.append(x[k] * k)
+            return sum(map(mul, paces, slope[k - 1 :: -1]), ZERO) / k
+
+        return of_function
+
+    def _rests(self, node: int) -> bool:
+        return len(self.problem.states) <= node < self.problem.resting
 
     def linear(self, orders: int) -> list[arb_mat]:
         """Return the coefficients of the derivatives of the rates by the states."""
         problem, n = self.problem, len(self.problem.states)
-        partials: list[dict[int, arb_series]] = []  # by the states
         with precision(flint.ctx.prec, orders):
             values = [arb_series(row[:orders]) for row in self.rows]
-            for i, node in enumerate(problem.nodes[: problem.of_rates]):
-                found = {i: arb_series([1])} if i < n else {}
-                if node.moves and node.arguments:
-                    slopes = _slopes(node, values, values[i])
-                    for j, slope in zip(node.arguments, slopes, strict=True):
-                        for state, x in partials[j].items():
-                            term = x * slope
-                            found[state] = found[state] + term if state in found else term
-                partials.append(found)
-            none = arb_series([0])
-            rows = [[partials[rate].get(j, none) for j in range(n)] for rate in problem.rates]
-            return [arb_mat([[x[k] for x in row] for row in rows]) for k in range(orders)]
-
-
-def _slopes(node: Node, values: list[arb_series], value: arb_series) -> tuple[arb_series, ...]:
-    """Return the derivatives of a node's value by its arguments."""
-    x, *others = (values[j] for j in node.arguments)
-    match node.op:
-        case "+":
-            return ONE, ONE
-        case "-":
-            return ONE, -ONE
-        case "*":
-            return others[0], x
-        case "/":
-            return 1 / others[0], -value / others[0]
-        case "negative":
-            return (-ONE,)
-    return (values[node.slope],)
+            for node in problem.nodes[problem.of_series : problem.of_linear]:
+                values.append(ARITHMETIC[node.op](*(values[i] for i in node.arguments)))
+        found = [arb_mat(n, n) for _ in range(orders)]
+        for at, node in problem.linear.items():
+            for k, matrix in enumerate(found):
+                matrix[at] = values[node][k]
+        return found
 
 
 def flow(linear: Sequence[arb_mat], begin: arb_mat, step: arb) -> list[arb_mat]:
@@ -216,7 +214,7 @@ class Stepper:
     at: arb  # s
     longest: float = math.inf  # s, of the step that is tried next
 
-    def advance(self, end: float, inputs: Sequence[arb]) -> Iterator[Step]:
+    def advance(self, end: float, resting: Sequence[arb]) -> Iterator[Step]:
         """Take steps to the next communication point; Obstacle where none is possible."""
         for _ in range(MOST_ATTEMPTS):
             remaining = arb(end) - self.at
@@ -224,11 +222,11 @@ class Stepper:
             length = remaining if is_last else arb(self.longest)
             size = float(length.mid())
             try:
-                step = self.step(length, inputs)
+                step = self.step(length, resting)
             except Obstacle as obstacle:
                 self.longest = size * obstacle.factor
                 if self.longest < SHORTEST * float(remaining.mid()):
-                    raise self._named(obstacle, remaining, inputs) from None
+                    raise self._named(obstacle, remaining, resting) from None
                 continue
             orders = len(step.motion[0])
             self.longest = max(self.longest, size * (1.25 if orders < LAST_ORDER - 5 else 1.0))
@@ -238,64 +236,66 @@ class Stepper:
                 return
         raise Obstacle("growth", 0, 0.5)
 
-    def _named(self, obstacle: Obstacle, remaining: arb, inputs: Sequence[arb]) -> Obstacle:
+    def _named(self, obstacle: Obstacle, remaining: arb, resting: Sequence[arb]) -> Obstacle:
         """Where states grow: look for a node without bounds a little ahead, which may be why."""
         if obstacle.kind != "growth":
             return obstacle
         ahead, n = UNIT * AHEAD * remaining, len(self.problem.states)
         hull, count = self.states.hull().entries(), self.problem.of_series
-        values = self.problem.balls(hull, inputs, self.at, count)
+        values = self.problem.balls(hull, resting, self.at, count)
         wide = [x + values[rate] * ahead for x, rate in zip(hull, self.problem.rates, strict=True)]
-        values = self.problem.balls(wide, inputs, self.at + ahead, count)
+        values = self.problem.balls(wide, resting, self.at + ahead, count)
         bad = [i for i in range(n, count) if not values[i].is_finite()]
         return Obstacle("undefined", bad[0], 0.5) if bad else obstacle
 
-    def crossing(self, guard: int, end: float, inputs: Sequence[arb]) -> Step | None:
+    def crossing(self, guard: int, end: float, resting: Sequence[arb]) -> Step | None:
         """Go on as if there were no event; a step at whose end a guard has the other sign."""
         node, is_positive, _ = self.problem.guards[guard]
         for shorter in CROSSINGS:
             length = (arb(end) - self.at) * shorter
             try:
-                step = self.step(length, inputs, guarded=False)
+                step = self.step(length, resting, guarded=False)
             except Obstacle:
                 continue
             hull, time = step.after.hull().entries(), self.at + length
-            x = self.problem.balls(hull, inputs, time, node + 1)[node]
+            x = self.problem.balls(hull, resting, time, node + 1)[node]
             if x < 0 if is_positive else x > 0:
                 return step
         return None
 
-    def step(self, length: arb, inputs: Sequence[arb], guarded: bool = True) -> Step:
+    def step(self, length: arb, resting: Sequence[arb], guarded: bool = True) -> Step:
         """Take a step of this length; Obstacle if it cannot be."""
         problem, before, begin = self.problem, self.states, self.at
         n, hull = len(problem.states), before.hull().entries()
-        middle = self._middle(length, inputs)
-        half = len(middle.rows[0]) // 2
-        near = Series(problem, hull, inputs, begin, length)
+        middle = self._middle(length, resting)
+        half = middle.orders // 2
+        near = Series(problem, hull, resting, begin, length)
         for _ in range(half):
             near.extend()
-        box = self._box(middle, near, inputs)
+        box = self._box(middle, near, resting)
         remainder = [UNIT * (ALLOWED * x.abs_upper()) for x in self._remainder(box, middle, near)]
         motion = middle.rows[:n]
         if guarded:
             self._guard(near, box)
         # |Y - 1| is at most e^(the size of f's derivatives) - 1, for each element
-        sizes = box.linear(1)[0] * length
+        linear = box.linear(half + 1)
+        sizes = linear[0] * length
         most = arb_mat(n, n, [x.abs_upper() for x in sizes.entries()]).exp()
         for i in range(n):
             if not most[i, i] < LARGEST_GROWTH:
                 raise Obstacle("growth", i, 0.75)
         wide = identity(n) + around_zero(most - identity(n))
         while True:
-            last = flow(box.linear(half + 1), wide, length)[-1]
+            last = flow(linear, wide, length)[-1]
             sizes = zip(last.entries(), most.entries(), strict=True)
             if half > LAST_ORDER or all(abs(x) <= SHARE * y for x, y in sizes):
                 break
             half += 4
-            while len(box.rows[0]) <= half:
+            while box.orders <= half:
                 box.extend()
-            while len(near.rows[0]) < half:
+            while near.orders < half:
                 near.extend()
+            linear = box.linear(half + 1)
         derivatives = flow(near.linear(half), identity(n), length)
         jacobian = added(derivatives) + last
         jacobian = arb_mat(n, n, [x + (x - x.mid()) * LOOSENED for x in jacobian.entries()])
@@ -309,20 +309,20 @@ class Stepper:
         middles = [[x.mid() for x in row] for row in motion]
         return Step(length, after, middles, [x.mid() for x in derivatives])
 
-    def _middle(self, length: arb, inputs: Sequence[arb]) -> Series:
+    def _middle(self, length: arb, resting: Sequence[arb]) -> Series:
         """Return the series of the centre: as many orders as change anything."""
         centre = self.states.centre.entries()
         small = [small_for(x) / 4 for x in centre]
-        series = Series(self.problem, centre, inputs, self.at, length)
+        series = Series(self.problem, centre, resting, self.at, length)
         size = last = math.inf
         while size + last > 1:
             sizes = [upper(x) / s for x, s in zip(series.extend(), small, strict=True)]
             last, size = size, max(sizes)
-            if len(series.rows[0]) >= LAST_ORDER or not size < math.inf:
+            if series.orders >= LAST_ORDER or not size < math.inf:
                 raise Obstacle("growth", sizes.index(size), 0.875)
         return series
 
-    def _box(self, middle: Series, near: Series, inputs: Sequence[arb]) -> Series:
+    def _box(self, middle: Series, near: Series, resting: Sequence[arb]) -> Series:
         """Return the series of all motions from a box at all times of the step: a guess."""
         box = []
         for x, row in zip(middle.rows, near.rows[: len(self.problem.rates)], strict=False):
@@ -331,12 +331,12 @@ class Stepper:
             radius = reach * (1 + ROOM) + row[0].rad() * WIDE + small_for(row[0])
             box.append(row[0].mid() + row[1].mid() / 2 + UNIT * radius.abs_upper())
         times = self.at + near.step * arb(0.5, 0.5)
-        return Series(self.problem, box, inputs, times, near.step)
+        return Series(self.problem, box, resting, times, near.step)
 
     def _remainder(self, box: Series, middle: Series, near: Series) -> list[arb]:
         """Return the coefficients after the last order over the box, which holds all motions."""
         last: list[arb] = []
-        for _ in middle.rows[0]:
+        for _ in range(middle.orders):
             last = box.extend()
         for i, (row, wide) in enumerate(zip(near.rows[: len(last)], box.rows, strict=False)):
             terms = [*row[2:], wide[len(row)]]
@@ -345,7 +345,7 @@ class Stepper:
                 raise Obstacle("growth", i, 0.75)
         most = [max(small_for(x[0]), SHARE * upper(x[0].rad())) for x in near.rows[: len(last)]]
         while bad := [i for i, x in enumerate(last) if not upper(x) * ALLOWED <= most[i]]:
-            if len(middle.rows[0]) >= LAST_ORDER:
+            if middle.orders >= LAST_ORDER:
                 raise Obstacle("growth", bad[0], 0.8125)
             middle.extend()
             last = box.extend()

@@ -39,7 +39,6 @@ MAY_INCLUDE = {
     r"fmu/fmi": ("src/instance", "src/model"),
     r"fmu/fmi\d": ("fmu/fmi", "src/instance", "src/model"),
     r"models": ("src/model",),
-    r"rparm/proof": (),
     r"models/\w+": ("models", "src/model"),
 }  # fmt: skip
 # the equations of another model

@@ -31,7 +31,7 @@ COMMANDS = {
         "rparm/commands/files.py", "rparm/systems/ecos.py",
         "models/*/animation.py", "models/*/study.py",
         "fmu/generate.py", "fmu/document.py", "fmu/references.py", "fmu/package.py",
-        "fmu/source_code.py", "fmu/equations_to_fmu.py", "fmu/equations_to_motion.py",
+        "fmu/source_code.py", "fmu/equations_to_fmu.py",
         "fmu/equations_schema.py",
     ),
     "campaign": (

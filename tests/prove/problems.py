@@ -1,6 +1,5 @@
 """Problems for the prover, without FMUs, and what it answers."""
 
-import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -10,28 +9,24 @@ from typing import Any
 
 import numpy as np
 from flint import arb
+from rparm.fmu_tools.compiler.read.model_file import ModelFile, read
 
 from rparm.proof import enclosure as enclosures
 from rparm.proof.enclosure import Enclosure
 from tests.support.paths import ROOT
-
-sys.path.insert(0, str(ROOT / "fmu"))
-from compiler.read.model_file import read  # noqa: E402
-from compiler.write.motion import motion  # noqa: E402
 
 EXAMPLES = ROOT / "examples" / "models"
 ARM = ROOT / "models" / "rp_manipulator" / "rp_manipulator.toml"
 
 
 @cache
-def model(given: str | Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The motion of a file, or of a text, and the start values that it gives."""
+def model(given: str | Path) -> ModelFile:
+    """Read a file, or a text."""
     with TemporaryDirectory() as folder:
         path = given if isinstance(given, Path) else Path(folder) / "model.toml"
         if isinstance(given, str):
             path.write_text(given)
-        file = read(path)
-    return motion(file), {v.name: v.start for v in file.variables.values() if v.start is not None}
+        return read(path)
 
 
 def scenario(
@@ -42,7 +37,8 @@ def scenario(
     inputs: Mapping[str, Sequence[float]] | None = None,
 ) -> Any:
     """What a proof needs of a scenario: values of the file, but for these; inputs are held."""
-    values = model(given)[1] | dict(parameters or {}) | dict(initial or {})
+    starts = {v.name: v.start for v in model(given).variables.values() if v.start is not None}
+    values = starts | dict(parameters or {}) | dict(initial or {})
     return SimpleNamespace(
         path=Path("model.toml"), start=times[0], times=np.array(times), initial=initial or {},
         start_values=values,
@@ -59,7 +55,7 @@ def enclose(
     **more: Any,
 ) -> Enclosure:
     """Enclose states and outputs at these times; `by`: the module that does it."""
-    prover = by.Prover(model(given)[0], with_outputs=True)
+    prover = by.Prover(model(given), with_outputs=True)
     return prover.enclose(scenario(given, times, **more), within, check=check)
 
 

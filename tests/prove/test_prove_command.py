@@ -29,7 +29,7 @@ from tests.equations.examples import FOLDER, quick
 from tests.prove.problems import PENDULUM
 from tests.support.rparm_project import MISTAKES
 
-PROVER = enclosure.provers()["rp_manipulator"]
+PROVER = enclosure.prover_of(project.scenario_file("free_fall"))
 STATES = {"q1", "q2", "dq1", "dq2"}
 OWN = """
 model = "rp_manipulator"

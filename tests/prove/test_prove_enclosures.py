@@ -21,7 +21,11 @@ from rparm.proof.prover import Step
 from tests.prove.problems import EXAMPLES, PENDULUM, ROOT, SMALL, enclose, holds
 from tests.support.tables import tables
 
-SOURCES = ROOT / "rparm" / "proof"
+SOURCES = {  # in the order in which they import each other
+    "rparm.fmu_tools.compiler.graph.graph": ROOT / "fmu" / "compiler" / "graph" / "graph.py",
+    **{f"rparm.proof.{name}": ROOT / "rparm" / "proof" / f"{name}.py"
+       for name in ("problem", "prover", "enclosure")},
+}  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
@@ -100,6 +104,12 @@ def test_a_motor_follows_its_exponentials() -> None:
         i, speed, _, angle = [x[2] for x in (linear * arb(time)).exp().tolist()]
         assert holds(found, row, {"i": i, "speed": speed, "angle": angle})
     assert widest(found, ("i", "speed", "angle")) < 1e-26
+
+
+def test_a_start_may_follow_from_an_input() -> None:
+    text = 'name = "S"\n[inputs]\nu = {}\n[states]\nx = { start = "2 * u", derivative = "-x" }'
+    found = enclose(text, [0.0, 1.0], inputs={"u": [0.3, 5.0]}, check=True)
+    assert holds(found, 1, {"x": 2 * arb(0.3) * arb(-1).exp()})
 
 
 def test_a_ball_falls_until_its_impact() -> None:
@@ -194,13 +204,14 @@ def test_polynomials_that_fail_the_equations_are_refused(monkeypatch: pytest.Mon
 
 def with_fault(monkeypatch: pytest.MonkeyPatch, file: str, before: str, after: str) -> ModuleType:
     """What encloses motions, after a text is replaced in a file, which has it once."""
-    for name in ("prover", "enclosure"):
-        text = (SOURCES / f"{name}.py").read_text()
-        if name == file:
+    for name, source in SOURCES.items():
+        text = source.read_text()
+        if source.stem == file:
             assert text.count(before) == 1
             text = text.replace(before, after)
-        module = ModuleType(f"rparm.proof.{name}")
-        monkeypatch.setitem(sys.modules, module.__name__, module)
+        module = ModuleType(name)
+        module.__package__ = name.rpartition(".")[0]
+        monkeypatch.setitem(sys.modules, name, module)
         exec(compile(text, name, "exec"), module.__dict__)
     return module
 

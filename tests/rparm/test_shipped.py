@@ -107,7 +107,7 @@ def test_a_full_disk_leaves_nothing_behind(release: Path, tmp_path: Path) -> Non
 def archive(tmp_path: Path) -> Path:
     """Two files."""
     path = tmp_path / "archive.tar.xz"
-    path.write_bytes(packed([("project/a.h", CONTENT), ("x/proof/a.json", b"{}")]))
+    path.write_bytes(packed([("project/a.h", CONTENT), ("x/b.json", b"{}")]))
     shipped.unpacked.cache_clear()
     return path
 
@@ -117,7 +117,7 @@ def test_an_archive_is_unpacked_and_what_is_broken_mended(
     archive: Path, tmp_path: Path, broken: str | None
 ) -> None:
     folder = shipped.unpacked(archive, tmp_path / "cache")
-    file, other = folder / "project" / "a.h", folder / "x" / "proof" / "a.json"
+    file, other = folder / "project" / "a.h", folder / "x" / "b.json"
     file.unlink() if broken is None else file.write_text(broken)
     before = other.stat()
     shipped.unpacked.cache_clear()
