@@ -37,7 +37,7 @@ def test_equations_stand_under_their_names(tmp_path: Path) -> None:
     ):
         assert equation in lines
     assert "const double a_by_phi = " in function(source, "jacobian")
-    for name in ("d_inertia", "dd_inertia", "d_der_omega"):
+    for name in ("d_inertia", "dd_inertia", "d_a"):
         assert f"const double {name} = " in function(source, "derivatives")
 
 
