@@ -3,9 +3,10 @@
 # add_fmu(NAME BY_HAND file.toml LIBRARY target [FOLDER models/...] ...)
 #
 # Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or the one of them that
-# VERSIONS names, or with DESCRIPTION_ONLY no archive, from the model's file and its lock file. The folder may have a page, README.md, pictures of it, and
-# model.png. The library has the C of the hook of a file with equations or, BY_HAND, the struct model of which the file
-# declares the variables. The archive carries inputs and references of the scenarios after REFERENCES. Targets:
+# VERSIONS names, or with DESCRIPTION_ONLY none, from the model's file and its lock file. The folder may have a page,
+# README.md, pictures of it, and model.png. The library has the C of the hook of a file with equations or, BY_HAND, the
+# struct model of which the file declares the variables. The archive carries inputs and references of the scenarios
+# after REFERENCES. Targets:
 #   NAME_equations             the library with the struct model of EQUATIONS
 #   NAME, NAME_fmi3            the shared objects
 #   NAME_fmu, NAME_fmi3_fmu    the archives
