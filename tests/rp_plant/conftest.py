@@ -6,7 +6,14 @@ from pathlib import Path
 import pytest
 
 from rparm.fmi.fmu_file import Fmu
+from tests.rp_plant.plant_in_c import PlantInC
 from tests.support.rparm_project import fmi3_fmu
+
+
+@pytest.fixture(scope="session")
+def plant_in_c(tmp_path_factory: pytest.TempPathFactory) -> PlantInC:
+    """struct model of RPPlant."""
+    return PlantInC(tmp_path_factory.mktemp("plant"))
 
 
 @pytest.fixture(scope="session")

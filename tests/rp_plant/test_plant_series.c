@@ -1,5 +1,5 @@
-/* The series of the plant on a rigid stop and before modes are decided, and friction over a step.
- * test_plant_series.py has all orders, fmu/test_plant_fmu.py values against the Lagrangian. */
+/* Friction over a step. test_plant_series.py has all orders of the series, test_plant_model.py the
+ * first ones in all modes. */
 #include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_plant_equations.h"
@@ -13,15 +13,10 @@ enum { MAX_ROWS = 128 };
 
 typedef double row[SERIES_LENGTH];
 
-static struct rp_test_random random_source;
 static struct rp_plant_values plant;
 static double time_scale;
 static double inputs[PLANT_INPUTS][SERIES_INPUT_LENGTH];
 static row rows[MAX_ROWS];
-
-void setUp(void) {
-    random_source.state = 37;
-}
 
 static void expand(int last, row all[MAX_ROWS]) {
     const struct series_origin origin = {
@@ -37,56 +32,6 @@ static void expand(int last, row all[MAX_ROWS]) {
     }
     ASSERT_OK(rp_plant_model.series->extend(&origin, 0, last, all));
 }
-
-/* ---- First orders --------------------------------------------------------------------------- */
-
-static void assert_first_orders(void) {
-    double u[PLANT_INPUTS];
-    double dx[PLANT_STATES];
-    double z[RP_PLANT_INDICATORS];
-    struct indicator kinds[RP_PLANT_INDICATORS];
-    const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
-    time_scale = 0.25;
-    memset(inputs, 0, sizeof inputs);
-    memcpy(u, &plant.inputs, sizeof u);
-    for (int i = 0; i < PLANT_INPUTS; i++) {
-        inputs[i][0] = u[i];
-    }
-    expand(1, rows);
-    ASSERT_OK(rp_plant_model.right_hand_side(&plant, 3.0, x, u, dx));
-    ASSERT_OK(rp_plant_model.events->indicators(&plant, 3.0, x, u, z));
-    rp_plant_model.events->describe(&plant, kinds);
-    for (int i = 0; i < PLANT_STATES; i++) {
-        ASSERT_CLOSE(dx[i] * time_scale, rows[i][1], 1e-12 * (100.0 + fabs(dx[i])));
-    }
-    for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
-        if (kinds[i].kind == INDICATOR_OF_MODEL) {
-            const double found = rows[rp_plant_model.series->row_of_indicator[i]][0];
-            ASSERT_CLOSE(z[i], found, 1e-12 * (100.0 + fabs(z[i])));
-        }
-    }
-}
-
-/* On a rigid stop, and with modes that are not decided yet. */
-static void test_the_first_orders_are_those_of_the_model(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        plant_test_random_plant(&random_source, &plant);
-        const int i = n % 2;
-        plant.dq[i] = 0.0;
-        plant.modes.joint[1 - i] = plant.dq[1 - i] > 0.0 ? RP_PLANT_FORWARD : RP_PLANT_BACKWARD;
-        if (n % 4 < 2) {
-            plant.parameters.stops[i] = RP_PLANT_STOPS_RIGID;
-            plant.parameters.lower[i] = plant.q[i] - (n % 8 < 4 ? 0.0 : 1.0);
-            plant.parameters.upper[i] = plant.q[i] + (n % 8 < 4 ? 1.0 : 0.0);
-            plant.modes.joint[i] = RP_PLANT_STUCK;
-        } else {
-            plant.modes = (struct rp_plant_modes){.payload = RP_PLANT_UNDECIDED};
-        }
-        assert_first_orders();
-    }
-}
-
-/* ---- Steps ---------------------------------------------------------------------------------- */
 
 static void assert_reach(double expected, double dq2) {
     double reach[PLANT_STATES];

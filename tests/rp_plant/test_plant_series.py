@@ -6,37 +6,34 @@ gives the coefficients that the recurrences in C have to give but for rounding.
 
 from __future__ import annotations
 
-import ctypes
 import random
-import subprocess
 from collections.abc import Iterator, Sequence
 from functools import reduce
 from itertools import product
-from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from tests.equations.compiled import BUILD, LENGTH, Origin, Words
-from tests.support.paths import ROOT
+from tests.rp_plant.plant_in_c import (
+    ATTACHED,
+    COMPLIANT,
+    FREE,
+    NONE,
+    RELEASED,
+    STUCK,
+    PlantInC,
+)
+from tests.support.model_calls import series
 from tests.support.plain_equations import (
     STATES,
-    Array,
     Place,
     PlainEquations,
     Sized,
-    Structure,
     along,
-    is_whole,
     precision,
 )
 
-PLANT = ROOT / "models" / "rp_plant"
-LIBRARIES = [BUILD / "libRPPlant_equations.a", BUILD / "models" / "rp_plant" / "librp_plant.a"]
-SHOWN = "extern const char rp_plant_model[]; const char *const shown = rp_plant_model;"
-STUCK, FREE = 0, 2
-ATTACHED, RELEASED = 1, 2
-NONE, COMPLIANT = 1, 3
 FEATURES = ("armature", "damping", "breakaway", "contact", "payload")
 INPUTS = [("tau", 0), ("tau", 1), ("wrench", 0), ("wrench", 1), ("wrench", 2)]
 DEGREE = 3  # of inputs
@@ -131,62 +128,22 @@ def exact(plain: PlainEquations, plant: Any, scale: float, inputs: Inputs) -> li
     return [*motion.values(), *plain.values(followed, along(motion, leaf))]
 
 
-class InC:
-    """The series of the libraries of the build."""
-
-    def __init__(self, plain: PlainEquations, library: Path) -> None:
-        self.plain = plain
-        command = ["cc", "-shared", "-fPIC", "-xc", "-", "-xnone", "-o", library]
-        command += ["-Wl,--start-group", *LIBRARIES, "-Wl,--end-group", "-lm"]
-        subprocess.run(command, input=SHOWN, text=True, check=True)
-        self.library = ctypes.CDLL(str(library))
-        model = ctypes.c_size_t.in_dll(self.library, "shown").value
-        series = Words.from_address(model).series
-        self.row_count, rows, extend = (ctypes.c_size_t * 3).from_address(series)
-        self.row_of_indicator = (ctypes.c_size_t * 10).from_address(rows)
-        number, pointer = ctypes.c_int, ctypes.c_void_p
-        self.extend = ctypes.CFUNCTYPE(number, pointer, number, number, pointer)(extend)
-        self.plant = self._type(Structure("rp_plant_values"))
-
-    def _type(self, kind: Any) -> Any:
-        """The type in ctypes."""
-        if isinstance(kind, Array):
-            return self._type(kind.of) * kind.length
-        if not isinstance(kind, Structure):
-            return ctypes.c_int if is_whole(kind) else ctypes.c_double
-        fields = self.plain.interpreter.types.fields(kind, None)
-        listed = [(name, self._type(of)) for name, of in fields.items()]
-        return type(kind.name, (ctypes.Structure,), {"_fields_": listed})
-
-    def series(self, plant: Any, scale: float, inputs: Inputs) -> list[list[float]]:
-        """The same as `exact`, in two parts."""
-        rows = (ctypes.c_double * LENGTH * self.row_count)()
-        for row in rows:
-            row[:] = [float("nan")] * LENGTH
-        for row, x in zip(rows, (*plant.q, *plant.dq), strict=False):
-            row[0] = x
-        given = (ctypes.c_double * (DEGREE + 1) * len(INPUTS))(*map(tuple, inputs))
-        places = [ctypes.cast(ctypes.byref(x), ctypes.c_void_p) for x in (plant, given)]
-        origin = Origin(places[0], 0.0, scale, places[1], False)
-        for first, last in ((0, 7), (8, ORDER)):
-            assert self.extend(ctypes.byref(origin), first, last, rows) == 0
-        followed = [self.row_of_indicator[i] for i in indicators(plant)]
-        return [rows[i][: ORDER + 1] for i in (*range(len(STATES)), *followed)]
-
-
-@pytest.fixture(scope="module")
-def in_c(tmp_path_factory: pytest.TempPathFactory) -> InC:
-    plain = PlainEquations(PLANT / "rp_plant_calculated.h", "rp_plant_calculate")
-    return InC(plain, tmp_path_factory.mktemp("series") / "series.so")
+def in_parts(in_c: PlantInC, plant: Any, scale: float, inputs: Inputs) -> list[list[float]]:
+    """The same as `exact` from the libraries of the build, in two parts."""
+    rows = series(in_c.words, np.frombuffer(plant), np.array(inputs), np.nan, (7, ORDER), scale)
+    followed = [in_c.row_of_indicator[i] for i in indicators(plant)]
+    return [rows[i][: ORDER + 1].tolist() for i in (*range(len(STATES)), *followed)]
 
 
 @pytest.mark.parametrize("joints", [*product((-1, STUCK, 1, FREE), repeat=2)], ids=str)
-def test_coefficients_are_those_of_the_plain_equations(in_c: InC, joints: Sequence[int]) -> None:
+def test_coefficients_are_those_of_the_plain_equations(
+    plant_in_c: PlantInC, joints: Sequence[int]
+) -> None:
     draw = random.Random(str(joints))
     for _ in range(EACH):
-        plant, scale = random_plant(in_c.plant(), draw, joints), 2.0 ** draw.randint(-10, 0)
+        plant, scale = random_plant(plant_in_c.plant(), draw, joints), 2.0 ** draw.randint(-10, 0)
         given = plant, scale, random_inputs(draw, scale)
-        rows = zip(exact(in_c.plain, *given), in_c.series(*given), strict=True)
+        rows = zip(exact(plant_in_c.plain, *given), in_parts(plant_in_c, *given), strict=True)
         for i, (expected, found) in enumerate(rows):
             for k, x in enumerate(found):
                 bound = ROUNDINGS * max(k, 1) * expected.size[k]
