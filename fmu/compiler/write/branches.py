@@ -14,7 +14,7 @@ from ..expressions.expression import in_order
 from ..graph.graph import CONDITIONS, DERIVATIVES, Graph, Value, read_in_series, unsigned
 from .blocks import Writer
 from .c_code import Code
-from .guards import Path, Plan, choices_in_blocks, common, paths
+from .guards import CostOf, Path, Plan, choices_in_blocks, common, paths
 from .statements import Block, Constant, Item, Operand, store
 
 if TYPE_CHECKING:
@@ -29,9 +29,7 @@ def partials_of(graph: Graph, value: Value) -> list[Value]:
     return [unsigned(slope) for x, slope in slopes if x.moves]
 
 
-def plan_with_partials(
-    graph: Graph, roots: Iterable[Value], cost_of: Callable[[Value], int]
-) -> Plan:
+def plan_with_partials(graph: Graph, roots: Iterable[Value], cost_of: CostOf) -> Plan:
     """Return the plan for values and for the derivatives that their series read."""
     roots, order = list(roots), []
     while new := in_order([*roots, *(g for y in order for g in partials_of(graph, y))], {*order}):

@@ -67,7 +67,7 @@ class Series:
             roots = [where_used(graph, used, root) for root in roots]
             self.leaves = leaves.but({("mode", USED): "are_used"})
         if not self.is_wide:
-            became = with_guards(roots, leaves.conditions)
+            became = with_guards(roots, leaves.conditions, self._cost)
             roots = [became[root] for root in roots]
         self.rates = dict(zip(rates, roots, strict=False))
         values = [value for value in with_partials(graph, roots) if value.moves]
@@ -191,7 +191,7 @@ class Series:
     @property
     def may_vanish(self) -> bool:
         """All terms of a state's series may be 0, though it does not rest."""
-        return any(_zeros(rate) >= VANISHING for rate in self.rates.values())
+        return not self.is_limited and any(_zeros(r) >= VANISHING for r in self.rates.values())
 
     @property
     def is_of_time(self) -> bool:

@@ -8,8 +8,10 @@ efforts, energies and loads read it under conditions of their own.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import and_, or_
 
 from ..expressions.expression import in_order
 from ..graph.graph import CONDITIONS, Value, is_unknown
@@ -20,16 +22,62 @@ COSTS |= {"entry": 1, "element": 2}
 OF_FUNCTION = 20
 MOST_CHOSEN = 4  # cost of both branches of ?:
 WORTH_A_BRANCH = 8  # cost of what is not calculated then
+MOST_CASES = 2**14  # of integer leaves together
+OF_CASES = {"and": and_, "or": or_}
 MOST_LEVELS = 20  # of guards within each other
+CostOf = Callable[[Value], int]
 Path = tuple[tuple[Value, bool], ...]  # conditions that hold, or do not, from outside to inside
 
 
 @dataclass(frozen=True)
 class Need:
-    """A value is needed where integer leaves have one of these values and the literals hold."""
+    """A value is needed in these cases, if the literals hold."""
 
-    sets: tuple[tuple[Value, frozenset[int]], ...] = ()
+    cases: int
     literals: Path = ()
+
+
+class Space:
+    """What integer leaves may be together: a set of such cases has bits in a whole number."""
+
+    def __init__(self, order: Iterable[Value], conditions: Conditions) -> None:
+        self.conditions, count = conditions, 1
+        strides: dict[Value, int] = {}
+        for leaf in order:
+            size = len(conditions.domains.get(leaf, ()))
+            if size and count * size <= MOST_CASES:
+                strides[leaf] = count
+                count *= size
+        self.all = (1 << count) - 1
+        self.where: dict[Value, dict[int, int]] = {}
+        for leaf, stride in strides.items():
+            numbers = sorted(conditions.domains[leaf])
+            period, ones = len(numbers) * stride, (1 << stride) - 1
+            each = sum(1 << start for start in range(0, count, period))
+            self.where[leaf] = {x: (ones << i * stride) * each for i, x in enumerate(numbers)}
+        self.found: dict[Value, int | None] = {}
+
+    def cases(self, condition: Value) -> int | None:
+        """Return where a condition holds; None if other values decide, too."""
+        if condition not in self.found:
+            self.found[condition] = self._cases(condition)
+        return self.found[condition]
+
+    def _cases(self, condition: Value) -> int | None:
+        leaf, numbers = self.conditions.members.get(condition, (None, ()))
+        if leaf in self.where:
+            return reduce(or_, (self.where[leaf][x] for x in numbers), 0)
+        if condition.op not in ("not", "and", "or"):
+            return None
+        parts = [self.cases(part) for part in condition.arguments]
+        if None in parts:
+            return None
+        return self.all ^ parts[0] if condition.op == "not" else OF_CASES[condition.op](*parts)
+
+    def left(self, cases: int) -> Iterator[tuple[Value, frozenset[int]]]:
+        """Yield leaves, and what they may be."""
+        for leaf, where in self.where.items():
+            yield leaf, frozenset(x for x, of_number in where.items() if cases & of_number)
 
 
 def cost(value: Value) -> int:
@@ -59,19 +107,19 @@ class Plan:
         return cls(roots, order, found, choices_in_blocks(order, found))
 
 
-def with_guards(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value]:
+def with_guards(
+    roots: Sequence[Value], conditions: Conditions, cost_of: CostOf | None = None
+) -> dict[Value, Value]:
     """Put values that only some cases need behind choices; map each to its successor."""
     order = in_order(roots)
     if not any(value.op == "if" for value in order):
         return {value: value for value in order}
     conditions.learn(order)
-    return guarded(roots, conditions)
+    return guarded(roots, conditions, cost_of or cost)
 
 
 def choices_in_blocks(
-    order: Iterable[Value],
-    places: Mapping[Value, Path],
-    cost_of: Callable[[Value], int] | None = None,
+    order: Iterable[Value], places: Mapping[Value, Path], cost_of: CostOf | None = None
 ) -> list[Value]:
     """Return choices with calculations in a branch."""
     inside = costs_inside(order, places, cost_of or cost)
@@ -145,7 +193,7 @@ def known_on(path: Path, conditions: Conditions) -> Known:
 
 
 def costs_inside(
-    values: Iterable[Value], places: Mapping[Value, Path], cost_of: Callable[[Value], int]
+    values: Iterable[Value], places: Mapping[Value, Path], cost_of: CostOf
 ) -> Counter[tuple[Path, Value]]:
     """Return the cost of both branches of each condition, by its place."""
     found: Counter[tuple[Path, Value]] = Counter()
@@ -156,11 +204,11 @@ def costs_inside(
     return found
 
 
-def guarded(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value]:
+def guarded(roots: Sequence[Value], conditions: Conditions, cost_of: CostOf) -> dict[Value, Value]:
     """Put values that only some cases need behind choices; map each to its successor."""
     became = {value: value for value in in_order(roots)}
     for _ in range(MOST_LEVELS):
-        guards = Guards([became[root] for root in roots], conditions)
+        guards = Guards([became[root] for root in roots], conditions, cost_of)
         if not guards.found:
             break
         found = guards.rewritten()
@@ -187,11 +235,19 @@ def settled(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value
 class Guards:
     """The guards of values that are needed in some cases only: conditions that stand outermost."""
 
-    def __init__(self, roots: Sequence[Value], conditions: Conditions) -> None:
-        self.conditions = conditions
+    def __init__(self, roots: Sequence[Value], conditions: Conditions, cost_of: CostOf) -> None:
+        self.conditions, self.cost_of = conditions, cost_of
         self.order = in_order(roots)
         self.paths = paths(self.order, dict.fromkeys(roots, ()))
-        self.needs: dict[Value, Need] = dict.fromkeys(roots, Need())
+        self.space = Space(self.order, conditions)
+        self.needs: dict[Value, Need] = dict.fromkeys(roots, Need(self.space.all))
+        choosing = dict.fromkeys(v.arguments[0] for v in self.order if v.op == "if")
+        known = [(c, self.space.cases(c)) for c in choosing]
+        known = [(condition, cases) for condition, cases in known if cases is not None]
+        self.of_cases = [((condition, True), cases) for condition, cases in known]
+        self.of_cases += [
+            ((condition, False), self.space.all ^ cases) for condition, cases in known
+        ]
         for value in self.order[::-1]:
             need = self.needs[value]
             for argument, literal in uses(value):
@@ -209,43 +265,27 @@ class Guards:
             arguments = []
             for argument, literal in uses(value):
                 new, guard = found[argument], guards.get(argument)
-                if guard is not None and not self._is_inside(value, argument, literal, guards):
+                is_alike = guards.get(value) is guard and self.paths[value] == self.paths[argument]
+                if guard is not None and (literal or not is_alike):
                     new = self.conditions.select(guard, new, zero)
                 arguments.append(new)
             found[value] = _with(value, arguments, self.conditions)
         return found
 
-    def _is_inside(
-        self,
-        user: Value,
-        value: Value,
-        literal: tuple[Value, bool] | None,
-        guards: Mapping[Value, Value],
-    ) -> bool:
-        """Return whether a use of a value is behind the same guard."""
-        guard, path = guards[value], self.paths[value]
-        if guards.get(user) is guard and self.paths[user] == path:
-            return literal is None
-        of_use = (*self.paths[user], literal) if literal else self.paths[user]
-        if len(of_use) <= len(path):
-            return False
-        condition, holds = of_use[len(path)]
-        return guard is (condition if holds else self.conditions.no(condition))
-
     def _guards(self) -> dict[Value, Value]:
         """Return conditions that are stronger than the uses' and worth a branch."""
         found: dict[Value, Value] = {}
         costs: Counter[tuple[Path, Value]] = Counter()
-        inside = costs_inside(self.order, self.paths, cost)
+        inside = costs_inside(self.order, self.paths, self.cost_of)
         for value in self.order:
-            if cost(value) == 0 and value.op != "if":
+            if self.cost_of(value) == 0 and value.op != "if":
                 continue
             guard = self._condition(self.needs[value], known_on(self.paths[value], self.conditions))
             has_it = value.op == "if" and value.arguments[0] in (guard, self.conditions.no(guard))
             if guard.op != "number" and not has_it:
                 found[value] = guard
                 path = self.paths[value]
-                own = inside[path, value.arguments[0]] if value.op == "if" else cost(value)
+                own = inside[path, value.arguments[0]] if value.op == "if" else self.cost_of(value)
                 costs[path, guard] += own
         worth = [v for v, guard in found.items() if costs[self.paths[v], guard] >= WORTH_A_BRANCH]
         depth = min((len(self.paths[value]) for value in worth), default=0)
@@ -253,11 +293,17 @@ class Guards:
 
     def _condition(self, need: Need, known: Known) -> Value:
         """Turn a need into a condition, where some is known already."""
-        result = self.conditions.true
-        for leaf, values in need.sets:
+        result, left = self.conditions.true, self.space.all
+        for leaf, values in self.space.left(need.cases):
+            left &= reduce(or_, (self.space.where[leaf][x] for x in values), 0)
             member = self.conditions.member(leaf, values, known)
             result = self.conditions.both(result, self.conditions.resolve(member, known))
-        for condition, holds in need.literals:
+        literals = [*need.literals]
+        for literal, cases in self.of_cases:
+            if not need.cases & ~cases and left & ~cases:
+                left &= cases
+                literals.append(literal)
+        for condition, holds in literals:
             literal = condition if holds else self.conditions.no(condition)
             result = self.conditions.both(result, self.conditions.resolve(literal, known))
         return result
@@ -266,26 +312,29 @@ class Guards:
         """Add a condition to a need."""
         if condition.op == "not":
             return self._and(need, condition.arguments[0], not holds)
-        if condition in self.conditions.members:
-            leaf, inside = self.conditions.members[condition]
-            domain = self.conditions.domains[leaf]
-            sets = dict(need.sets)
-            sets[leaf] = sets.get(leaf, domain) & (inside if holds else domain - inside)
-            return Need(tuple(sets.items()), need.literals)
-        if condition.op in ("and", "or") and holds is (condition.op == "and"):
-            for part in condition.arguments:
-                need = self._and(need, part, holds)
-            return need
+        cases = self.space.cases(condition)
+        if cases is not None:
+            return Need(need.cases & (cases if holds else self.space.all ^ cases), need.literals)
+        if condition.op in ("and", "or"):
+            decides = condition.op == "or"  # a part with this truth
+            if holds is not decides:
+                for part in condition.arguments:
+                    need = self._and(need, part, holds)
+                return need
+            left = [part for part in condition.arguments if not self._is(need, part, not decides)]
+            if len(left) == 1:
+                return self._and(need, left[0], holds)
         new = (condition, holds)
-        return need if new in need.literals else Need(need.sets, (*need.literals, new))
+        return need if new in need.literals else Need(need.cases, (*need.literals, new))
+
+    def _is(self, need: Need, condition: Value, holds: bool) -> bool:
+        """Return whether a condition holds, or does not, in all cases of a need."""
+        cases = self.space.cases(condition)
+        if cases is None:
+            return (condition, holds) in need.literals
+        return not need.cases & (self.space.all ^ cases if holds else cases)
 
     def _either(self, first: Need, second: Need) -> Need:
         """Return the common part of two needs."""
-        other = dict(second.sets)
-        sets = []
-        for leaf, values in first.sets:
-            union = values | other.get(leaf, self.conditions.domains[leaf])
-            if union != self.conditions.domains[leaf]:
-                sets.append((leaf, union))
         literals = tuple(literal for literal in first.literals if literal in second.literals)
-        return Need(tuple(sets), literals)
+        return Need(first.cases | second.cases, literals)

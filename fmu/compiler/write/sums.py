@@ -13,6 +13,7 @@ from .guards import Path, common
 from .statements import Block, Item, Operand, Place, Statement, store
 
 FEWEST_IN_PAIRS = 4  # sums that gain by adding up two at once
+FEWEST_IN_BRANCH = 2  # likewise, in a loop of their own
 EACH = "int i = 1; i < k; i++"
 EACH_SECOND = "int i = 1; i + 1 < k; i += 2"
 Within = Callable[[Path, list[Item]], list[Item]]  # statements in the blocks of a path
@@ -83,7 +84,7 @@ class Sums:
             groups[self.paths[term]].append(term)
         for number, path in enumerate(sorted(groups, key=len)):
             single, loop = groups[path], Loop([], [])
-            if not is_array and len(single) >= FEWEST_IN_PAIRS:
+            if not is_array and len(single) >= (FEWEST_IN_BRANCH if path else FEWEST_IN_PAIRS):
                 pairs = Pairs(self, single, f"at_{number}" if number else "at", len(parts.sums))
                 single, loop = pairs.single, pairs.loop
                 parts.still += pairs.declared
