@@ -37,6 +37,7 @@ WIDE = 150  # values that move in a model whose series has elements side by side
 ALIKE = 2  # such values of a form; models with fewer gain more by blocks for their choices
 VANISHING = 5  # factors of a product whose zero may have as many orders as the shortest series
 COST_OF_SUM = 10  # of products in a coefficient
+WORTH_BRANCHES = 200  # cost of coefficients in branches, below which all are calculated
 FEWEST_PRODUCTS = 4  # with inputs, that are worth a branch
 ORDERS = 4  # of inputs: SERIES_INPUT_LENGTH
 USED = "inputs that values are multiplied by are used"
@@ -62,13 +63,10 @@ class Series:
         roots = [*rates.values(), *followed]
         self.is_wide = is_wide(roots, leaves.conditions)
         roots = scaled(graph, roots, self.is_wide)
-        used = [] if self.is_wide else inputs_in_products(roots)
+        plan, used = self._in_branches(roots)
+        roots = plan.roots
         if used:
-            roots = [where_used(graph, used, root) for root in roots]
             self.leaves = leaves.but({("mode", USED): "are_used"})
-        if not self.is_wide:
-            became = with_guards(roots, leaves.conditions, self._cost)
-            roots = [became[root] for root in roots]
         self.rates = dict(zip(rates, roots, strict=False))
         values = [value for value in with_partials(graph, roots) if value.moves]
         self.sums = Sums(self._row)
@@ -97,9 +95,8 @@ class Series:
         self._coefficients: dict[Value, Operand] = {}
         self._late: list[Item] = []  # statements for the values of one form
         self._path: Path = ()  # of the value whose coefficient is written
-        plan = plan_with_partials(graph, [root for root in roots if root.moves], self._cost)
         self.opened = Opened(plan)
-        if plan.choices and not self.is_wide:
+        if plan.choices:
             self._write_branches(plan, needed)
         else:
             self._write_all(needed)
@@ -114,6 +111,23 @@ class Series:
             else:
                 last = "if", ("==", "k", "1"), ("*", "h", self.still.of(rate)), 0.0
             self.integrals.append(store(Place("row[", i, "][k]"), last))
+
+    def _in_branches(self, roots: list[Value]) -> tuple[Plan, list[Value]]:
+        """Plan branches that save much, and return inputs whose products are in one."""
+
+        def plan_of(roots: list[Value]) -> Plan:
+            moving = [root for root in roots if root.moves]
+            return replace(plan_with_partials(self.graph, moving, self._cost), roots=roots)
+
+        if self.is_wide:
+            return replace(plan_of(roots), choices=[]), []
+        used = inputs_in_products(roots)
+        guarded = [where_used(self.graph, used, root) for root in roots] if used else roots
+        became = with_guards(guarded, self.leaves.conditions, self._cost)
+        plan = plan_of([became[root] for root in guarded])
+        if sum(self._cost(v) for v in plan.order if plan.paths.get(v)) >= WORTH_BRANCHES:
+            return plan, used
+        return replace(plan_of(roots), choices=[]), []
 
     def _are_used(self, used: list[Value]) -> Statement:
         """Say whether inputs that factors are multiplied by are 0 in all orders."""
