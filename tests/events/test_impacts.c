@@ -112,6 +112,21 @@ EACH_METHOD static void test_a_lift_that_grows_from_the_weight_on_takes_it_at_on
     }
 }
 
+/* Where the importer integrates, a lift that it takes back in Event Mode moves nothing. */
+static void test_a_lift_taken_back_in_event_mode_moves_nothing(void) {
+    for (int is_taken_back = 0; is_taken_back < 2; is_taken_back++) {
+        struct discrete_update update;
+        prepare_bouncing(1, 1e-8);
+        set(BEAD_x, 0.0);
+        begin_outside();
+        set(BEAD_lift, 1.5 * g);
+        instance_enter_event_mode(instance);
+        set(BEAD_lift, is_taken_back ? 0.5 * g : 1.25 * g);
+        ASSERT_OK(instance_update_discrete_states(instance, &update));
+        TEST_ASSERT_EQUAL_INT(is_taken_back ? RESTS : FLIES, get_int(BEAD_mode));
+    }
+}
+
 /* An integrator outside ends a little before the impact or a little after it. */
 static void test_integrated_from_outside_it_bounces_once_where_it_falls(void) {
     static const struct {

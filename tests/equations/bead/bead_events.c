@@ -73,14 +73,16 @@ static void meet_floor(struct bead_values *values, double pull, double tolerance
 static enum status update(void *values_pointer, const struct event *event) {
     struct bead_values *values = values_pointer;
     const double pull = values->parameters.g - values->lift;
-    const bool hits = event->triggered != NULL ? event->triggered[WAY] : values->motion[0] <= 0.0;
+    const bool *triggered = event->triggered;
+    const bool hits = triggered != NULL ? triggered[WAY] : values->motion[0] <= 0.0;
+    const bool is_lifted = triggered != NULL && triggered[LOAD] && event->du[0] >= 0.0;
     if (values->mode == UNDECIDED) {
         values->mode = FLIES;
     }
     if (hits && values->mode == FLIES) {
         meet_floor(values, pull, event->tolerance[0]);
     }
-    if (pull < 0.0 || (pull == 0.0 && event->du[0] > 0.0)) {
+    if (is_lifted || pull < 0.0 || (pull == 0.0 && event->du[0] > 0.0)) {
         values->mode = FLIES;
     }
     return STATUS_OK;
