@@ -112,6 +112,30 @@ EACH_METHOD static void test_a_lift_that_grows_from_the_weight_on_takes_it_at_on
     }
 }
 
+EACH_METHOD static void test_a_ramp_lifts_it_from_rest(void) {
+    prepare_bouncing(method, 1e-10);
+    set(BEAD_x, 0.0);
+    initialize();
+    set_input_derivative(BEAD_lift, 1, 0.25 * g);
+    run(0.0, 6.0, 1);
+    TEST_ASSERT_EQUAL_INT(1, event_count());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14, 4.0, last_event_time());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.5 * g, get(BEAD_v)); // v' = g (t - 4) / 4
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, g / 3.0, get(BEAD_x));
+}
+
+/* The lift touches the weight and falls again. */
+EACH_METHOD static void test_a_touch_does_not_lift_it(void) {
+    prepare_bouncing(method, 1e-10);
+    set(BEAD_x, 0.0);
+    initialize();
+    set_input_derivative(BEAD_lift, 1, g); // g (t - t^2 / 4), g at t = 2
+    set_input_derivative(BEAD_lift, 2, -0.5 * g);
+    run(0.0, 3.0, 1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, get(BEAD_v));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, get(BEAD_x));
+}
+
 /* Where the importer integrates, a lift that it takes back in Event Mode moves nothing. */
 static void test_a_lift_taken_back_in_event_mode_moves_nothing(void) {
     for (int is_taken_back = 0; is_taken_back < 2; is_taken_back++) {

@@ -293,6 +293,7 @@ static void test_integrated_from_outside(void) {
             ASSERT_OK(instance_update_discrete_states(instance, &update));
             TEST_ASSERT_EQUAL_INT(k == 0, update.states_changed);
             TEST_ASSERT_EQUAL_INT(n, strokes());
+            TEST_ASSERT_EQUAL_INT(n, event_count());
         }
     }
 }
