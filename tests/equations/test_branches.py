@@ -55,7 +55,13 @@ def text_of(rates: Mapping[str, str], where: Mapping[str, str], more: str = "") 
 
 @pytest.fixture(scope="module")
 def joints(tmp_path_factory: pytest.TempPathFactory) -> Model:
-    return Model(tmp_path_factory.mktemp("joints"), text_of(RATES, WHERE))
+    """A model whose series has branches, though they save little."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("compiler.write.c_series.WORTH_BRANCHES", 0)
+        model = Model(tmp_path_factory.mktemp("joints"), text_of(RATES, WHERE))
+        extend = c_model.source(model.file).partition(" extend(")[2].partition("\n}\n")[0]
+    assert "for (int i" in extend.partition("if (values->m_mode1 != 0")[2]
+    return model
 
 
 EACH_MODE = pytest.mark.parametrize("modes", [*itertools.product(*MODES.values())])
@@ -158,15 +164,17 @@ real law(real v) {
 """
 
 
+@pytest.mark.parametrize("worth", [0, 10**9])
 @pytest.mark.parametrize(
     ("start", "law"),
     [(-0.01, "w1**3"), (0.99, "sin(w1) + w1**2"), (1.01, "exp(-w1**2) * w1 * (w1 + 2)")],
 )
 def test_values_that_c_compares_decide_at_the_origin(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: float, law: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, start: float, law: str, worth: int
 ) -> None:
     """The series is that of one branch, also where it moves to the other one."""
     monkeypatch.setattr(c_model, "_has_kinks", lambda _: False)
+    monkeypatch.setattr("compiler.write.c_series.WORTH_BRANCHES", worth)
     (tmp_path / "law.h").write_text(LAW, encoding="utf-8")
     shutil.copy(ROOT / "models" / "real.h", tmp_path)
     rates = {"q1": "w1", "w1": "0.3 * fx - 3 * law(w1)"}

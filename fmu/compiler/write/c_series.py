@@ -63,8 +63,7 @@ class Series:
         roots = [*rates.values(), *followed]
         self.is_wide = is_wide(roots, leaves.conditions)
         roots = scaled(graph, roots, self.is_wide)
-        plan, used = self._in_branches(roots)
-        roots = plan.roots
+        roots, plan, used = self._in_branches(roots)
         if used:
             self.leaves = leaves.but({("mode", USED): "are_used"})
         self.rates = dict(zip(rates, roots, strict=False))
@@ -112,22 +111,17 @@ class Series:
                 last = "if", ("==", "k", "1"), ("*", "h", self.still.of(rate)), 0.0
             self.integrals.append(store(Place("row[", i, "][k]"), last))
 
-    def _in_branches(self, roots: list[Value]) -> tuple[Plan, list[Value]]:
-        """Plan branches that save much, and return inputs whose products are in one."""
-
-        def plan_of(roots: list[Value]) -> Plan:
-            moving = [root for root in roots if root.moves]
-            return replace(plan_with_partials(self.graph, moving, self._cost), roots=roots)
-
-        if self.is_wide:
-            return replace(plan_of(roots), choices=[]), []
-        used = inputs_in_products(roots)
-        guarded = [where_used(self.graph, used, root) for root in roots] if used else roots
-        became = with_guards(guarded, self.leaves.conditions, self._cost)
-        plan = plan_of([became[root] for root in guarded])
-        if sum(self._cost(v) for v in plan.order if plan.paths.get(v)) >= WORTH_BRANCHES:
-            return plan, used
-        return replace(plan_of(roots), choices=[]), []
+    def _in_branches(self, roots: list[Value]) -> tuple[list[Value], Plan, list[Value]]:
+        """Return roots, the plan of those that move, and inputs whose products are in a branch."""
+        if not self.is_wide:
+            used = inputs_in_products(roots)
+            guarded = [where_used(self.graph, used, root) for root in roots] if used else roots
+            became = with_guards(guarded, self.leaves.conditions, self._cost)
+            guarded = [became[root] for root in guarded]
+            plan = plan_with_partials(self.graph, [r for r in guarded if r.moves], self._cost)
+            if sum(self._cost(v) for v in plan.order if plan.paths.get(v)) >= WORTH_BRANCHES:
+                return guarded, plan, used
+        return roots, Plan(roots, [], {}, []), []
 
     def _are_used(self, used: list[Value]) -> Statement:
         """Say whether inputs that factors are multiplied by are 0 in all orders."""
@@ -154,11 +148,13 @@ class Series:
     def _write_branches(self, plan: Plan, needed: list[Value]) -> None:
         """Write rows in the branches that need them."""
         self.first = AtOrigin(self, needed)
-        hidden = {v for pair in self._inner() for v in pair if self.opened.path(v)}
-        zeros = {k: [store(self._row(v, k), 0.0) for v in hidden] for k in ("0", "k")}
-        self.first.statements = [*zeros["0"], *Blocks(self.first, plan).written()[1]]
+        # elsewhere functions are lines, which hide nothing: 0 could mean that they begin to grow
+        hidden = dict.fromkeys(v for pair in self._inner() for v in pair if self.opened.path(v))
+        line = {"0": 0.0, "k": ("if", ("==", "k", "1"), 1.0, 0.0)}
+        lines = {k: [store(self._row(v, k), of) for v in hidden] for k, of in line.items()}
+        self.first.statements = [*lines["0"], *Blocks(self.first, plan).written()[1]]
         moving = replace(plan, choices=[choice for choice in plan.choices if choice.moves])
-        self.later.statements = [*zeros["k"], *Blocks(OfOrder(self), moving).written()[1]]
+        self.later.statements = [*lines["k"], *Blocks(OfOrder(self), moving).written()[1]]
         self.opened.write(self.still, self.condition, moves=False)
         self.opened.write(self.start, self.condition, moves=True)
 
