@@ -90,13 +90,14 @@ class Prover:
         """Enclose all motions of a scenario at its communication points, up to the first event.
 
         The start of states may be off by `within`; if too broad for a proof, it is halved, and its
-        halves, too. UserError if a proof takes over `seconds`, or if `check` confirms a step not.
+        halves, too. UserError if a proof takes over `seconds` of the processor, or if a step is not
+        confirmed, with `check`.
         """
         off, problem = within or {}, Problem(self.model, scenario, self.with_outputs)
         start = {n: (float(problem.known[n]), off.get(n, 0.0)) for n in self.states}
 
         def pieces(start: Start, halvings: int) -> list[Enclosure]:
-            proof = Proof(problem, start, progress, time.monotonic() + seconds)
+            proof = Proof(problem, start, progress, time.thread_time() + seconds)
             try:
                 found = proof.enclosure(check)
             except WrongClaim as error:
@@ -122,7 +123,7 @@ class Proof:
     problem: Problem
     start: Start
     progress: Progress | None = None
-    deadline: float = math.inf  # of time.monotonic()
+    deadline: float = math.inf  # of time.thread_time()
 
     def enclosure(self, check: bool = False) -> Enclosure:
         """Return it; WrongClaim if a step should be checked and is not confirmed."""
@@ -140,7 +141,7 @@ class Proof:
         rows, stopped = [self._point(held[0], times[0])], None
         for end, inputs in zip(times[1:], held, strict=True):
             self.resting = problem.resting_balls(inputs)
-            if time.monotonic() > self.deadline:
+            if time.thread_time() > self.deadline:
                 raise UserError(f"{problem.scenario.path}: the proof takes too long")
             try:
                 self._to(end, inputs)

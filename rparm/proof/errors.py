@@ -19,8 +19,8 @@ from rparm.runs.simulation import Result
 from rparm.units import rounded_up
 
 UNDERFLOW = 2.0**-800  # in SI units: above all that intervals around 0 allow for underflow
-# of a scenario that is proven where nobody asks for it: communication steps, time that it takes
-MOST_STEPS = 4_000
+# of a scenario that is proven where nobody asks for it: communication steps, s of the processor
+MOST_STEPS = 5_000
 LONGEST_RUN = 10.0
 SHOWN = 5  # wrong values of a reference
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import reduce
-from operator import add, mul
+from operator import add, le, mul
 
 import flint
 import numpy as np
@@ -173,7 +173,12 @@ def column(values: Sequence[arb]) -> arb_mat:
 
 def around_zero(values: arb_mat) -> arb_mat:
     """Return balls around 0 that contain these."""
-    return arb_mat(values.nrows(), values.ncols(), [UNIT * x.abs_upper() for x in values.entries()])
+    return arb_mat(values.nrows(), values.ncols(), [UNIT * x for x in sizes(values).entries()])
+
+
+def sizes(values: arb_mat) -> arb_mat:
+    """Return bounds of absolute values."""
+    return arb_mat(values.nrows(), values.ncols(), [x.abs_upper() for x in values.entries()])
 
 
 def start_of(values: Sequence[arb], radii: Sequence[float]) -> States:
@@ -268,7 +273,7 @@ class Stepper:
         problem, before, begin = self.problem, self.states, self.at
         n, hull = len(problem.states), before.hull().entries()
         middle = self._middle(length, resting)
-        half = middle.orders // 2
+        half = max(middle.orders // 3, 2)
         near = Series(problem, hull, resting, begin, length)
         for _ in range(half):
             near.extend()
@@ -279,18 +284,19 @@ class Stepper:
             self._guard(near, box)
         # |Y - 1| is at most e^(the size of f's derivatives) - 1, for each element
         linear = box.linear(half + 1)
-        sizes = linear[0] * length
-        most = arb_mat(n, n, [x.abs_upper() for x in sizes.entries()]).exp()
+        most = sizes(linear[0] * length).exp()
         for i in range(n):
             if not most[i, i] < LARGEST_GROWTH:
                 raise Obstacle("growth", i, 0.75)
         wide = identity(n) + around_zero(most - identity(n))
+        radii = column([x.rad() for x in hull])
+        allowed = (most * radii * arb(SHARE)).entries()
         while True:
             last = flow(linear, wide, length)[-1]
-            sizes = zip(last.entries(), most.entries(), strict=True)
-            if half > LAST_ORDER or all(abs(x) <= SHARE * y for x, y in sizes):
+            widened = (sizes(last) * radii).entries()
+            if half > LAST_ORDER or all(map(le, widened, allowed)):
                 break
-            half += 4
+            half += 2
             while box.orders <= half:
                 box.extend()
             while near.orders < half:
