@@ -12,7 +12,7 @@ from typing import Any
 from flint import arb, arb_mat, arb_poly, arb_series
 
 from rparm.proof.problem import Problem, Start
-from rparm.proof.prover import States, Step, precision
+from rparm.proof.prover import States, Step, column, precision
 
 BITS = 192
 PARTS = 16  # of a step, in which derivatives are inverted
@@ -76,10 +76,9 @@ class Checker:
             for i, name in enumerate(start):
                 if name in problem.starts and start[name][0] == problem.known[name]:
                     known[i] = values[problem.starts[name]]
-            one = arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
-            centre = _column([x.mid() for x in known])
-            off = _column([UNIT * radius for _, radius in start.values()])
-            self.set = States(centre, one, _column(known) - centre, one, off)
+            centre, one = column([x.mid() for x in known]), arb_mat(n, n, 1)
+            off = column([UNIT * radius for _, radius in start.values()])
+            self.set = States(centre, one, column(known) - centre, one, off)
 
     # ---- The equations -----------------------------------------------------------------------
 
@@ -101,24 +100,17 @@ class Checker:
         values = self._values(states, inputs, time, self.problem.of_rates)
         return [values[node] for node in self.problem.rates]
 
-    def _derivatives(
-        self, states: Sequence[Series], inputs: Sequence[arb], time: Series
-    ) -> list[list[Series]]:
-        """Return those of the rates (rows) by the states."""
-        problem, n = self.problem, len(states)
-        values = self._values(states, inputs, time, problem.of_rates)
-        columns = []
-        for state in range(n):
-            slopes: list[Series] = [arb(int(i == state)) for i in range(n)]
-            for node, z in zip(problem.nodes[n : problem.of_rates], values[n:], strict=True):
-                slope = arb(0)
-                # what is 0 needs no slope
-                if node.op in SLOPES and any(not _is_zero(slopes[j]) for j in node.arguments):
-                    by = SLOPES[node.op](*(values[j] for j in node.arguments), z)
-                    slope = _sum(x * slopes[j] for x, j in zip(by, node.arguments, strict=True))
-                slopes.append(slope)
-            columns.append([slopes[node] for node in problem.rates])
-        return [list(row) for row in zip(*columns, strict=True)]
+    def _slopes(self, values: Sequence[Series], along: Sequence[Series]) -> list[Series]:
+        """Return the derivatives of the rates along a direction."""
+        problem, slopes, n = self.problem, [*along], len(along)
+        for node, z in zip(problem.nodes[n : problem.of_rates], values[n:], strict=True):
+            slope = arb(0)
+            # what is 0 needs no slope
+            if node.op in SLOPES and any(not _is_zero(slopes[j]) for j in node.arguments):
+                by = SLOPES[node.op](*(values[j] for j in node.arguments), z)
+                slope = _sum(x * slopes[j] for x, j in zip(by, node.arguments, strict=True))
+            slopes.append(slope)
+        return [slopes[node] for node in problem.rates]
 
     # ---- Steps -------------------------------------------------------------------------------
 
@@ -223,7 +215,7 @@ class _Tube:
         for sizes in self.fails:
             parts = ((arb(until) ** k - arb(since) ** k) / k for k in range(1, len(sizes) + 1))
             balls.append(UNIT * _sum(map(operator.mul, sizes, parts)).abs_upper())
-        return _column([x.abs_upper() for x in (by * _column(balls)).entries()])
+        return column([x.abs_upper() for x in (by * column(balls)).entries()])
 
     def _at(self, poly: arb_poly, orders: int, over: bool) -> arb_series:
         """Its coefficients from the begin, or from any time of the step."""
@@ -263,23 +255,21 @@ class _Tube:
 
     def _deviation(self, defect: list[list[arb]]) -> list[list[arb]]:
         """Add bounds of (Df Y - Y') w in the tube."""
-        orders, n = self.orders[1], len(self.p)
+        orders, n, found = self.orders[1], len(self.p), []
         added = [[*x, *[arb(0)] * (orders + 1 - len(x))] for x in defect]
-        found = []
+        count = self.checker.problem.of_rates
         with precision(BITS, orders + 1):
             for over in (False, True):
-                states = self._around(orders, over)
-                slopes = self.checker._derivatives(states, self.inputs, self._time(over))
-                flow = [[self._at(y, orders, over) for y in row] for row in self.flow]
-                found.append([
-                    _sum(slopes[i][k] * self.length * flow[k][j] for k in range(n)
-                         if not _is_zero(slopes[i][k]))
-                    - self._at(self.flow[i][j].derivative(), orders, over)
-                    for i in range(n) for j in range(n)
-                ])  # fmt: skip
-        for ij, (x, y) in enumerate(zip(*found, strict=True)):
+                states, time = self._around(orders, over), self._time(over)
+                values = self.checker._values(states, self.inputs, time, count)
+                for flow in zip(*self.flow, strict=True):
+                    along = [self._at(y, orders, over) for y in flow]
+                    for slope, y in zip(self.checker._slopes(values, along), flow, strict=True):
+                        rate = self._at(y.derivative(), orders, over)
+                        found.append(slope * self.length - rate)
+        for ji, (x, y) in enumerate(zip(found[: n * n], found[n * n :], strict=True)):
             for k, size in enumerate(_sizes(x, y, orders)):
-                added[ij // n][k] += size * self.room[ij % n]
+                added[ji % n][k] += size * self.room[ji // n]
         return added
 
     def _inverses(self) -> Iterator[arb_mat]:
@@ -294,10 +284,10 @@ class _Tube:
     def end(self, inverse: arb_mat) -> tuple[arb_mat, arb_mat, arb_mat]:
         """Return p and `inverse` Y at the end, and what is off there, times `inverse`."""
         flow = inverse * arb_mat([[y(arb(1)) for y in row] for row in self.flow])
-        off = _column([arb(0)] * len(self.p))
+        off = column([arb(0)] * len(self.p))
         for k, part in enumerate(self.inverses):
             off += self._off(k / PARTS, (k + 1) / PARTS, flow * part)
-        return _column([p(arb(1)) for p in self.p]), flow, off * UNIT
+        return column([p(arb(1)) for p in self.p]), flow, off * UNIT
 
 
 def _sizes(begin: arb_series, over: arb_series, orders: int) -> list[arb]:
@@ -311,10 +301,6 @@ def _hull(of: States) -> arb_mat:
 
 def _sum(terms: Iterable[Series]) -> Series:
     return sum(terms, arb(0))
-
-
-def _column(values: Sequence[arb]) -> arb_mat:
-    return arb_mat(len(values), 1, [*values])
 
 
 def _is_zero(x: Series) -> bool:

@@ -219,9 +219,11 @@ class Problem:
 
     def _product(self, x: Value, count: int) -> Value:
         """x^count by squares."""
-        half = self._product(x, count // 2) if count > 1 else x
-        square = self.graph.value("*", half, half) if count > 1 else x
-        return self.graph.value("*", square, x) if count > 1 and count % 2 else square
+        if count == 1:
+            return x
+        half = self._product(x, count // 2)
+        square = self.graph.value("*", half, half)
+        return self.graph.value("*", square, x) if count % 2 else square
 
     # ---- What ends it ------------------------------------------------------------------------
 

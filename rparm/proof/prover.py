@@ -140,14 +140,8 @@ def flow(linear: Sequence[arb_mat], begin: arb_mat, step: arb) -> list[arb_mat]:
     """Return the coefficients of Y in Y' = linear Y, one more than are given."""
     found = [begin]
     for k in range(len(linear)):
-        terms = [linear[j] * found[k - j] for j in range(k + 1)]
-        found.append(added(terms) * (step / (k + 1)))
+        found.append(reduce(add, map(mul, linear, found[::-1])) * (step / (k + 1)))
     return found
-
-
-def added(matrices: Sequence[arb_mat]) -> arb_mat:
-    """Add matrices."""
-    return reduce(add, matrices)
 
 
 # ---- Sets ----------------------------------------------------------------------------------------
@@ -184,18 +178,13 @@ def sizes(values: arb_mat) -> arb_mat:
 def start_of(values: Sequence[arb], radii: Sequence[float]) -> States:
     """Return the set of these starts, each of which may be off by a radius."""
     n = len(values)
-    one = identity(n)
+    one = arb_mat(n, n, 1)
     roundings = column([x - x.mid() for x in values])
     spread = one if any(radii) else arb_mat(n, n)
     return States(
         column([x.mid() for x in values]), one, roundings, spread,
         column([UNIT * arb(r) for r in radii]),
     )  # fmt: skip
-
-
-def identity(n: int) -> arb_mat:
-    """Return the matrix 1."""
-    return arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
 
 
 # ---- Steps ---------------------------------------------------------------------------------------
@@ -288,7 +277,8 @@ class Stepper:
         for i in range(n):
             if not most[i, i] < LARGEST_GROWTH:
                 raise Obstacle("growth", i, 0.75)
-        wide = identity(n) + around_zero(most - identity(n))
+        one = arb_mat(n, n, 1)
+        wide = one + around_zero(most - one)
         radii = column([x.rad() for x in hull])
         allowed = (most * radii * arb(SHARE)).entries()
         while True:
@@ -302,8 +292,8 @@ class Stepper:
             while near.orders < half:
                 near.extend()
             linear = box.linear(half + 1)
-        derivatives = flow(near.linear(half), identity(n), length)
-        jacobian = added(derivatives) + last
+        derivatives = flow(near.linear(half), one, length)
+        jacobian = reduce(add, derivatives, last)
         jacobian = arb_mat(n, n, [x + (x - x.mid()) * LOOSENED for x in jacobian.entries()])
         try:
             after = self._moved(column([*map(sum, motion)]) + column(remainder), jacobian)
