@@ -18,7 +18,7 @@ from rparm.fmu_tools.compiler.read.content import ModelFile
 from rparm.interruption import temporary_folder
 from rparm.proof.checker import Checker, WrongClaim
 from rparm.proof.problem import Problem, Start
-from rparm.proof.prover import BITS, Obstacle, Stepper, precision, start_of, upper
+from rparm.proof.prover import BITS, CONFIRMED, Obstacle, Stepper, precision, start_of, upper
 from rparm.runs import scenario as scenarios
 from rparm.runs.scenario import Scenario
 
@@ -194,7 +194,8 @@ def ball_of(x: arb) -> Ball:
     """Return the midpoint as a sum of doubles, and a radius that is large enough."""
     high = float(x.mid())
     low = float(x.mid() - arb(high))
-    return high, low, upper(x - arb(high) - arb(low)) if x.is_finite() else math.inf
+    off = (x - arb(high) - arb(low)) * CONFIRMED
+    return high, low, upper(off) if x.is_finite() else math.inf
 
 
 # ---- Pieces of starts ----------------------------------------------------------------------------

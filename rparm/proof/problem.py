@@ -318,29 +318,31 @@ class Problem:
         self.starts = {name: place[x] for name, x in starts.items()}
 
     def balls(
-        self, states: Sequence[arb], resting: Sequence[arb], time: arb, count: int
+        self,
+        states: Sequence[arb],
+        resting: Sequence[arb],
+        time: arb,
+        count: int,
+        inputs: Sequence[arb] = (),
     ) -> list[arb]:
-        """Return the values of the first nodes; `resting`: those of nodes after the states."""
+        """Return the values of the first nodes; `resting`: of those after the states."""
         found = [*states, *resting]
         for node in self.nodes[len(found) : count]:
-            is_time = node.op == "time"
-            found.append(
-                time if is_time else OF_BALLS[node.op](*(found[i] for i in node.arguments))
-            )
+            match node.op:
+                case "number":
+                    found.append(node.number)
+                case "input":
+                    found.append(inputs[node.arguments[0]])
+                case "time":
+                    found.append(time)
+                case op:
+                    found.append(OF_BALLS[op](*(found[i] for i in node.arguments)))
         return found
 
     def resting_balls(self, inputs: Sequence[arb]) -> list[arb]:
         """Return the values of nodes that move at communication points only."""
-        n = len(self.states)
-        found = [arb(0)] * n
-        for node in self.nodes[n : self.resting]:
-            if node.op == "number":
-                found.append(node.number)
-            elif node.op == "input":
-                found.append(inputs[node.arguments[0]])
-            else:
-                found.append(OF_BALLS[node.op](*(found[i] for i in node.arguments)))
-        return found[n:]
+        none = [arb(0)] * len(self.states)
+        return self.balls(none, [], arb(0), self.resting, inputs)[len(none) :]
 
     def start_balls(self, start: Start, resting: Sequence[arb]) -> list[arb]:
         """Return the states; exactly what follows from parameters, where that is asked for."""

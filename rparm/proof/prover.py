@@ -20,6 +20,7 @@ BITS = 128
 ACCURATE = 2.0**-104  # a remainder that is small enough: in units of the state,
 ROUNDED = 2.0**-6  # or of this share of the state,
 SHARE = 2.0**-20  # or of this share of the hull's radius
+LEFT = 2.0**-30  # of what derivatives do to the set, may be left to their remainder
 LAST_ORDER = 48
 SHORTEST = 2.0**-40  # a step over what remains of a communication step, at least
 AHEAD = 2.0**-32  # how far ahead, in what remains, the reason is looked for where none is known
@@ -29,7 +30,7 @@ MOST_ATTEMPTS = 100_000  # within a communication step
 # by which a box is larger than what was estimated: of that, and of the hull
 ROOM, WIDE = 2.0**-8, 2.0**-3
 # what is claimed is larger, so that another theorem can confirm it: derivatives' radii, remainders,
-# and the set
+# the set, and values at communication points
 LOOSENED, ALLOWED, CONFIRMED = 1.0, 8.0, 1 + arb(2) ** -16
 ZERO, UNIT = arb(0), arb(0, 1)
 NONE = [ZERO] * (LAST_ORDER + 8)  # coefficients of what rests
@@ -262,7 +263,7 @@ class Stepper:
         problem, before, begin = self.problem, self.states, self.at
         n, hull = len(problem.states), before.hull().entries()
         middle = self._middle(length, resting)
-        half = max(middle.orders // 3, 2)
+        half = middle.orders // 2
         near = Series(problem, hull, resting, begin, length)
         for _ in range(half):
             near.extend()
@@ -279,8 +280,8 @@ class Stepper:
                 raise Obstacle("growth", i, 0.75)
         one = arb_mat(n, n, 1)
         wide = one + around_zero(most - one)
-        radii = column([x.rad() for x in hull])
-        allowed = (most * radii * arb(SHARE)).entries()
+        radii = column([x.rad() + small_for(x) for x in hull])
+        allowed = (most * radii * arb(LEFT)).entries()
         while True:
             last = flow(linear, wide, length)[-1]
             widened = (sizes(last) * radii).entries()

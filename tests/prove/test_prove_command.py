@@ -4,7 +4,8 @@ import json
 import math
 import random
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -24,32 +25,36 @@ from rparm.proof import enclosure
 from rparm.proof import errors as proof
 from rparm.runs import comparison
 from rparm.runs import scenario as scenarios
+from rparm.runs.scenario import Scenario
 from rparm.units import minus, rounded_up
 from tests.equations.examples import FOLDER, quick
 from tests.prove.problems import PENDULUM
 from tests.support.rparm_project import MISTAKES
 
 PROVER = enclosure.prover_of(project.scenario_file("free_fall"))
+SCENARIOS = sorted(project.models()["rp_manipulator"].glob("scenarios/*.toml"))
 STATES = {"q1", "q2", "dq1", "dq2"}
 OWN = """
 model = "rp_manipulator"
 title = "Own"
 description = "A short fall."
 tolerance = 1e-8
-[time]
-start = 0.0
-stop = 0.2
-step = 0.01
-[initial]
-q1 = 0.3
+time = { start = 0.0, stop = 0.2, step = 0.01 }
 """
 
 
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
     path = tmp_path / "own.toml"
-    path.write_text(OWN)
+    path.write_text(f"{OWN}initial = {{ q1 = 0.3 }}\n")
     return path
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[tuple[Fmu, Scenario]]:
+    """The arm, and a scenario of it."""
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
+        yield fmu, scenarios.load(path, fmu.model)
 
 
 def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
@@ -58,49 +63,58 @@ def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
     return json.loads(capsys.readouterr().out)
 
 
-def test_errors_of_each_method(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = document(capsys, str(own), "--check")
-    assert found["exit_code"] == 0
+def test_errors_of_each_method(
+    own: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The page has a plot a state, a curve a method; its table has what is printed."""
+    found = document(capsys, str(own), "--check", "--output", str(tmp_path))
+    page = (tmp_path / "proofs" / "own.html").read_text()
+    assert found["exit_code"] == 0 and found["checked"]["steps"] >= 20
     assert set(found["methods"]) == {"cvode_adams", "cvode_bdf", "erk", "taylor"}
     for errors in found["methods"].values():
         assert set(errors) == STATES
-        for error in errors.values():
+        for name, error in errors.items():
             assert 0 < error["radius"] < 1e-28 < error["error"] < 1e-6
             assert 0 <= error["at"] <= 0.2
-    assert found["checked"]["steps"] >= 20
+            assert f"proven error of {name}" in page
+            assert minus(f"{rounded_up(error['error'], 2)} at {error['at']:.4g} s") in page
+    assert Path(found["page"]).samefile(tmp_path / "proofs" / "own.html")
+    assert "The proof assumes the equations of motion" in page
 
 
 def test_proven_error_is_what_a_run_and_the_interval_say(own: Path) -> None:
-    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
-        scenario = scenarios.load(own, fmu.model)
+    with opened(own) as (fmu, scenario):
         found = PROVER.enclose(scenario).of(PROVER.states)
         bounds = proof.error_bounds(fmu, scenario, found, "erk", 1e-8)
         error = proof.largest_errors(bounds, found)["q1"]
-    own.write_text(OWN + '[parameters]\nsolver_method = "erk"\n')
+    own.write_text(own.read_text() + 'parameters = { solver_method = "erk" }\n')
     run = rparm.Scenario(own).run()
     apart = np.abs(run["q1"] - found.high[:, 0])
     assert error.error == pytest.approx(apart.max(), rel=1e-3)
     assert error.at == run["time"][apart.argmax()]
 
 
-def test_start_within_an_interval(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_start_within_an_interval(
+    own: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The fall multiplies what the start was off by: each bound is that, and more."""
-    found = document(capsys, str(own), "--method", "taylor", "--within", "0.01deg")
-    assert list(found["methods"]) == ["taylor"]
+    arguments = ["--method", "taylor", "--within", "0.01deg", "--output", str(tmp_path)]
+    found = document(capsys, str(own), *arguments)["methods"]["taylor"]
     for name in STATES:
-        assert 1e-5 < found["methods"]["taylor"][name]["radius"] < 1e-2 or name == "q2"
-    assert found["methods"]["taylor"]["q1"]["error"] >= np.radians(0.01)
+        assert 1e-5 < found[name]["radius"] < 1e-2 or name == "q2"
+    assert found["q1"]["error"] >= np.radians(0.01)
+    page = (tmp_path / "proofs" / "own.html").read_text()
+    assert "--within</span>" in page and "0.01deg" in page
+    assert '"kind":"bounds"' in page and '"name":"taylor at ' in page
 
 
-@pytest.mark.parametrize(
-    ("typed", "exact"),
-    [
-        ("1deg", arb.pi() / 180),
-        ("0.3deg", arb.pi() / 600),
-        ("0.7mrad", arb("0.0007")),
-        ("1mrad", arb("0.001")),
-    ],
-)
+TYPED = {
+    "1deg": arb.pi() / 180, "0.3deg": arb.pi() / 600,
+    "0.7mrad": arb("0.0007"), "1mrad": arb("0.001"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("typed", "exact"), TYPED.items())
 def test_no_start_is_lost_in_rounding(typed: str, exact: arb) -> None:
     """The radius is not below what was typed, and hardly above."""
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
@@ -108,15 +122,10 @@ def test_no_start_is_lost_in_rounding(typed: str, exact: arb) -> None:
     assert exact < arb(radius) < exact * (1 + 2.0**-40)
 
 
-@pytest.mark.parametrize(
-    "path",
-    sorted(project.models()["rp_manipulator"].glob("scenarios/*.toml")),
-    ids=lambda x: x.stem,
-)
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
 def test_each_scenario(path: Path) -> None:
     """Intervals are narrow, the reference is right, and `taylor` is proven to 1e-13."""
-    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
-        scenario = scenarios.load(path, fmu.model)
+    with opened(path) as (fmu, scenario):
         found = PROVER.enclose(scenario)
         good = proof.proven_reference(fmu, scenario, found)
         states = found.of(PROVER.states)
@@ -157,7 +166,7 @@ def test_a_scenario_of_a_model_of_equations(
     """Its FMU has the equations with it; values and held inputs are those of the scenario."""
     fmu = quick(FOLDER / "dc_motor.toml", tmp_path / "built")
     path = tmp_path / "run.toml"
-    head = OWN.replace('model = "rp_manipulator"', f'fmu = "{fmu.name}"').partition("[initial]")[0]
+    head = OWN.replace('model = "rp_manipulator"', f'fmu = "{fmu.name}"')
     path.write_text(f"{head}[parameters]\nR = 2.0\n[inputs.voltage]\ntable = [[0, 0], [0.2, 6]]\n")
     fmu.rename(tmp_path / fmu.name)
     found = document(capsys, str(path), "--check", "--method", "taylor")
@@ -205,30 +214,24 @@ COLUMNS = [
     "q1", "q2", "dq1", "dq2", "ddq1", "ddq2", "ee_x", "ee_y", "ee_vx", "ee_vy",
     "kinetic_energy", "potential_energy", "total_energy", "actuator_power",
 ]  # fmt: skip
-FAULTS: dict[str, Callable[[float], float]] = {
-    "the next double": lambda x: math.nextafter(x, math.inf),
-    "the one before": lambda x: math.nextafter(x, -math.inf),
-    "3 units": lambda x: x + 3 * math.ulp(x),
-    "1e-9": lambda x: x + 1e-9,
-    "1e-3": lambda x: x + 1e-3,
-    "sign": lambda x: -x or 1.0,
-    "none": lambda x: 0.0 if x else 5e-324,
-    "huge": lambda _: 1e300,
-}
+FAULTS: list[Callable[[float], float]] = [
+    lambda x: math.nextafter(x, math.inf), lambda x: math.nextafter(x, -math.inf),
+    lambda x: x + 3 * math.ulp(x), lambda x: x + 1e-9, lambda x: x + 1e-3,
+    lambda x: -x or 1.0, lambda x: 0.0 if x else 5e-324, lambda _: 1e300,
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["early_start", "coasting"])  # coasting has columns of zeros
 def test_every_wrong_value_of_a_reference_is_found(name: str, copies: Path) -> None:
     """One fault at a time, of each kind, in every column: at the start, the end and between."""
     draw = random.Random(40)
-    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
-        scenario = scenarios.load(project.scenario_file(name), fmu.model)
+    with opened(project.scenario_file(name)) as (fmu, scenario):
         exact = PROVER.enclose(scenario)
         right = comparison.load_reference(scenario, fmu.model)
         assert list(right.names) == COLUMNS
         for i, column in enumerate(COLUMNS):
             for row in (0, draw.randrange(1, len(right.values) - 1), len(right.values) - 1):
-                for kind, fault in FAULTS.items():
+                for kind, fault in enumerate(FAULTS):
                     values = right.values.copy()
                     values[row, i] = fault(float(values[row, i]))
                     planted = replace(right, values=values)
@@ -288,23 +291,22 @@ def test_a_truncated_reference_is_refused(copies: Path, capsys: pytest.CaptureFi
     assert f"{path}, line 362: is cut off in the middle" in capsys.readouterr().err
 
 
-def around_one(low: float) -> enclosure.Enclosure:
-    """A tiny interval around 1 + low."""
-    one = np.ones((1, 1))
-    return enclosure.Enclosure(np.zeros(1), ("x",), one, low * one, 1e-20 * one, None, ())
+ABOVE, BELOW, HALF = math.nextafter(1.0, 2.0), math.nextafter(1.0, 0.0), 2.0**-53
 
 
-def test_a_value_that_is_not_the_nearest_is_not_called_so() -> None:
+@pytest.mark.parametrize(
+    ("value", "low", "is_nearest"),
+    [
+        (1.0, 0.0, True), (ABOVE, 0.0, False), (BELOW, 0.0, False), (1.0, 0.99 * HALF, True),
+        (1.0, -0.51 * HALF, False),  # doubles are denser
+        (1.0, HALF, False),  # between two doubles
+    ],
+)  # fmt: skip
+def test_a_value_that_is_not_the_nearest(value: float, low: float, is_nearest: bool) -> None:
+    """Of an exact value in a tiny interval around 1 + low."""
     one = np.ones((1, 1))
-    exact = around_one(0.0)
-    rows = np.arange(1)
-    above, below = np.nextafter(one, 2), np.nextafter(one, 0)
-    assert proof.is_nearest(one, exact, rows)
-    assert proof.is_nearest(one, around_one(2.0**-53 * 0.99), rows)
-    assert not proof.is_nearest(one, around_one(-(2.0**-53) * 0.51), rows)  # doubles are denser
-    assert not proof.is_nearest(above, exact, rows)
-    assert not proof.is_nearest(below, exact, rows)
-    assert not proof.is_nearest(one, around_one(2.0**-53), rows)  # between two doubles
+    exact = enclosure.Enclosure(np.zeros(1), ("x",), one, low * one, 1e-20 * one, None, ())
+    assert proof.is_nearest(value * one, exact, np.arange(1)) == is_nearest
 
 
 def test_where_the_proof_ends(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -321,10 +323,11 @@ def test_mistakes(arguments: list[str], text: str, capsys: pytest.CaptureFixture
 
 
 def test_a_proof_that_takes_too_long_is_given_up() -> None:
-    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
-        path = project.scenario_file("sine_efforts")
-        with pytest.raises(UserError, match="takes too long"):
-            PROVER.enclose(scenarios.load(path, fmu.model), seconds=0.01)
+    with (
+        opened(project.scenario_file("sine_efforts")) as (_, scenario),
+        pytest.raises(UserError, match="takes too long"),
+    ):
+        PROVER.enclose(scenario, seconds=0.01)
 
 
 def test_from_python(own: Path) -> None:
@@ -337,8 +340,7 @@ def test_from_python(own: Path) -> None:
 
 def test_a_broad_start_is_proven_in_pieces() -> None:
     """The pieces cover the start, and their intervals hold motions from its ends."""
-    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
-        scenario = scenarios.load(project.scenario_file("hanging_swing"), fmu.model)
+    with opened(project.scenario_file("hanging_swing")) as (_, scenario):
         broad = PROVER.enclose(scenario, {"q1": 2e-4})
         assert broad.stopped is None and len(broad.starts) > 1
         for off in (-1.99e-4, -0.5e-4, 0.0, 1.99e-4):
@@ -355,27 +357,6 @@ def test_halves_cover_a_start() -> None:
     assert ends[0][0] - ends[0][1] <= Fraction(0.1) - Fraction(0.3)
     assert ends[0][0] + ends[0][1] >= ends[1][0] - ends[1][1]
     assert ends[1][0] + ends[1][1] >= Fraction(0.1) + Fraction(0.3)
-
-
-def test_the_page_of_a_proof(own: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One plot a state, one curve a method: its table has what is printed."""
-    found = document(capsys, str(own), "--output", str(tmp_path))
-    page = (tmp_path / "proofs" / "own.html").read_text()
-    assert Path(found["page"]).samefile(tmp_path / "proofs" / "own.html")
-    assert "The proof assumes the equations of motion" in page
-    for name, error in found["methods"]["taylor"].items():
-        assert f"proven error of {name}" in page
-        assert minus(f"{rounded_up(error['error'], 2)} at {error['at']:.4g} s") in page
-    main(["prove", str(own), "--within", "1mrad", "--method", "erk", "--output", str(tmp_path)])
-    page = (tmp_path / "proofs" / "own.html").read_text()
-    assert "--within</span>" in page and "1mrad" in page
-    assert '"kind":"bounds"' in page and '"name":"erk at ' in page
-
-
-@pytest.mark.parametrize("value", [1.21e-8, 1.2e-8, 9.99e-14, 1.0, 0.0, 2.0**-1074])
-def test_bounds_are_printed_rounded_up(value: float) -> None:
-    for digits in (1, 2):
-        assert value <= float(rounded_up(value, digits)) <= value * (1 + 10.0**-digits) + 1e-323
 
 
 def test_the_page_of_a_scenario_says_what_is_proven(tmp_path: Path) -> None:

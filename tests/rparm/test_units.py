@@ -12,7 +12,7 @@ from rparm.errors import UserError, WrongValueError
 from rparm.fmi.model import Variable
 from rparm.runs import scenario
 from rparm.runs.inputs import Polyline, Sines
-from rparm.units import HERTZ, SECONDS, duration, typed_quantity, units_of
+from rparm.units import HERTZ, SECONDS, duration, rounded_up, typed_quantity, units_of
 from tests.support.rparm_project import FMUS, MISTAKES, NAMES, declared, load
 from tests.support.toy_model import DESCRIPTION, TOY, toy
 
@@ -176,3 +176,9 @@ def test_a_scenario_takes_units_wherever_it_takes_values(tmp_path: Path) -> None
 
 def test_no_scenario_of_the_project_is_asked_about() -> None:
     assert not [name for name in NAMES if load(name).questions]
+
+
+@pytest.mark.parametrize("value", [1.21e-8, 1.2e-8, 9.99e-14, 1.0, 0.0, 2.0**-1074])
+def test_bounds_are_printed_rounded_up(value: float) -> None:
+    for digits in (1, 2):
+        assert value <= float(rounded_up(value, digits)) <= value * (1 + 10.0**-digits) + 1e-323
