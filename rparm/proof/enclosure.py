@@ -18,11 +18,12 @@ from rparm.fmu_tools.compiler.read.content import ModelFile
 from rparm.interruption import temporary_folder
 from rparm.proof.checker import Checker, WrongClaim
 from rparm.proof.problem import Problem, Start
-from rparm.proof.prover import BITS, CONFIRMED, Obstacle, Stepper, precision, start_of, upper
+from rparm.proof.prover import BITS, Obstacle, Stepper, precision, start_of, upper
 from rparm.runs import scenario as scenarios
 from rparm.runs.scenario import Scenario
 
 HALVINGS = 6  # of starts that are too broad to be proven at once
+ROUNDED_RADII = arb(2) ** -28  # sums of radii, which have 30 bits, differ by less
 ASSUMED = "the equations of motion, exact parameters and inputs as given, and IEEE doubles"
 Progress = Callable[[int], object]  # is called with 1 after each communication step
 Ball = tuple[float, float, float]  # |exact - (high + low)| <= radius
@@ -194,7 +195,7 @@ def ball_of(x: arb) -> Ball:
     """Return the midpoint as a sum of doubles, and a radius that is large enough."""
     high = float(x.mid())
     low = float(x.mid() - arb(high))
-    off = (x - arb(high) - arb(low)) * CONFIRMED
+    off = (x - arb(high) - arb(low)) * (1 + ROUNDED_RADII)
     return high, low, upper(off) if x.is_finite() else math.inf
 
 

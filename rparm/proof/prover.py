@@ -30,7 +30,7 @@ MOST_ATTEMPTS = 100_000  # within a communication step
 # by which a box is larger than what was estimated: of that, and of the hull
 ROOM, WIDE = 2.0**-8, 2.0**-3
 # what is claimed is larger, so that another theorem can confirm it: derivatives' radii, remainders,
-# the set, and values at communication points
+# and the set
 LOOSENED, ALLOWED, CONFIRMED = 1.0, 8.0, 1 + arb(2) ** -16
 ZERO, UNIT = arb(0), arb(0, 1)
 NONE = [ZERO] * (LAST_ORDER + 8)  # coefficients of what rests
