@@ -203,13 +203,7 @@ class Runtime:
             why = f"{error.strerror}; {INSTALL}"
             raise ModelFileError(f"{command[0]}: cannot be run: {why}") from None
         if ended.returncode:
-            lines = [line for line in ended.stderr.splitlines() if "error" in line]
-            reason = (lines or ended.stderr.splitlines() or ["no message"])[0]
-            # mostly the C is right: what fails is the compiler
-            way_out = f"gcc and clang need binutils, {INSTALL}"
-            if re.search(r"\.c:\d+:\d+: error: ", reason):
-                way_out = "the C that rparm wrote is wrong: please report this with the file"
-            raise ModelFileError(f"{command[0]}: {reason:.300}; {way_out}")
+            raise ModelFileError(f"{command[0]}: {_reason(ended.stderr)}")
 
     def sources(self, version: str, own: Library, roots: dict[str, Path]) -> Manifest:
         """Return all sources of a version's shared object, with the model's own part."""
@@ -219,6 +213,20 @@ class Runtime:
         include = [*own.include, *self.paths(content["include"])]
         model = Library(own.name, own.sources, include, own.prelude)
         return Manifest([model, *shared.libraries], roots | shared.roots)
+
+
+def _reason(text: str) -> str:
+    """Return the line of a compiler or linker that says what is wrong, and the way out."""
+    lines = text.splitlines() or ["no message"]
+    of_linker = [x for x in lines if re.search(r"undefined (reference|symbol)|multiple def", x)]
+    reason = [*of_linker, *(line for line in lines if "error" in line), *lines][0]
+    own = "|".join(re.escape(name) for name in C_FILES)
+    if re.search(rf"(^|[/\\])({own}):\d+:\d+: error: ", reason):
+        return f"{reason:.300}; the C that rparm wrote is wrong: please report this with the file"
+    if of_linker or re.search(r":\d+:\d+: (fatal )?error: ", reason):
+        return f"{reason:.300}; the sources of [hook] are to be mended"
+    # mostly the C is right: what fails is the compiler
+    return f"{reason:.300}; gcc and clang need binutils, {INSTALL}"
 
 
 def _found(words: list[str], of_this_machine: bool) -> list[str]:

@@ -50,7 +50,7 @@ START = "start.toml"
 STUDY = "study"  # the module of a system's folder that rparm.systems.comparison describes
 IDENTIFICATION = "identification"  # module of a system's folder, read by identification.request
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
-PROVEN = ("rp_manipulator",)  # models whose references and runs are proven
+PROVEN = "references/proven.toml"  # in the folder of a model whose references and runs are proven
 WEB = "wasm32-wasi"  # platform of FMUs for browsers
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
@@ -146,6 +146,11 @@ def models() -> dict[str, Path]:
     """Return the folders of all models that have scenarios, by name."""
     folders = sorted({path.parents[1] for path in models_folder().glob("*/scenarios/*.toml")})
     return {folder.name: folder for folder in folders}
+
+
+def proven() -> list[str]:
+    """Return the names of the models whose references and runs are proven."""
+    return [name for name, folder in models().items() if (folder / PROVEN).is_file()]
 
 
 def model(name: str) -> Path:

@@ -169,7 +169,7 @@ def _references(options: argparse.Namespace) -> Ended:
     check_writable(options.report)
     found: dict[str, ProvenReference] = {}
     rows, checked = [], 0
-    for name in project.PROVEN:
+    for name in project.proven():
         folder = project.model(name)
         files = [x for x in project.scenario_files().values() if x.parents[1] == folder]
         program = enclosures.prover_of(files[0])

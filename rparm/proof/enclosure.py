@@ -240,7 +240,7 @@ def prover_of(path: Path) -> Prover:
         if not is_file(file):
             expected = "expected a model whose motion can be proven"
             raise UserError(f"{path}: {expected}, got {subject.name}")
-        return Prover(_read(file), subject.name in project.PROVEN)
+        return Prover(_read(file), subject.name in project.proven())
     with zipfile.ZipFile(subject) as archive, temporary_folder() as folder:
         names = [
             n for n in archive.namelist() if n.startswith("resources/") and n.endswith(".toml")

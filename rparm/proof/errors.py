@@ -132,7 +132,7 @@ def errors_of_run(
     So it is without a prover, where a proof does not come to the end or takes more than
     `LONGEST_RUN` s, and for more than `most_steps` communication steps.
     """
-    if scenario.model not in project.PROVEN or len(scenario.times) > most_steps + 1:
+    if scenario.model not in project.proven() or len(scenario.times) > most_steps + 1:
         return None
     try:
         states_only = replace(prover_of(scenario.path), with_outputs=False)

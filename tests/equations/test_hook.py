@@ -19,8 +19,17 @@ MISTAKES = [
     ('sources = ["bead_events.c"]', "", "sources is missing"),
     ("bead_events.c", "missing.c", "sources: expected a C file, got 'missing.c'"),
     ('indicators = ["way", "load"]', 'indicators = ["way"]', "series: load is none of indicators"),
-    ('["way", "load"]', '["wey", "load"]', "expected a real variable, got 'wey'"),
+    (
+        '["way", "load"]',
+        '["wey", "load"]',
+        "expected a real entry of [where] or [outputs], got 'wey'",
+    ),
     ("{ mode = [] }", "{ mood = [] }", "reads: expected a variable, got 'mood'"),
+    ('["way", "load"]', '["g", "load"]', "expected a real entry of [where] or [outputs], got 'g'"),
+    ('["way", "load"]', '["way", "way"]', "indicators: expected different names"),
+    ("{ mode = [] }", '{ mode = "x" }', "reads: 'mode': expected a list of names"),
+    ("{ mode = [] }", "[]", "reads: expected a table"),
+    ("motion[1]", "motion", "field: 'motion' is not of the type of x"),
     ("motion[1]", "motion[0]", "field: 'motion[0]' is the place of x"),
     ("motion[1]", "motion[", "field: expected a field of C such as damping[0]"),
 ]

@@ -1,7 +1,4 @@
-"""Linear models of FMUs against exact ones, in all versions and kinds of FMI; equilibria.
-
-tests/models/test_every_model.c has the matrices of the arm.
-"""
+"""Linear models of FMUs against exact ones, in all versions and kinds of FMI; equilibria."""
 
 import math
 from collections.abc import Callable, Iterator

@@ -137,10 +137,16 @@ def _read_hook(file: ModelFile, head: dict[str, Any]) -> None:
                 raise ModelFileError(f"decides all events, but there is {key}")
         if not file.calculate:
             raise ModelFileError(f"expected code with a function {file.path.stem}_calculate")
+        for mode, names in given.get("reads", {}).items():
+            with placed("reads", shown(mode)):
+                keys.LIST(names)
         lists = (given.get(key, []) for key in ("indicators", "series"))
         file.hook = Hook(
             given["sources"], *lists, given.get("reads", {}), given.get("reach", False)
         )
+        for key in ("sources", "indicators", "series"):
+            if len({*(listed := given.get(key, []))}) < len(listed):
+                raise ModelFileError(f"{key}: expected different names, got {shown(listed)}")
         if missing := {*file.hook.series} - {*file.hook.indicators}:
             raise ModelFileError(f"series: {min(missing)} is none of indicators")
         for name in file.hook.sources:
@@ -151,16 +157,25 @@ def _read_hook(file: ModelFile, head: dict[str, Any]) -> None:
 def _check_places(file: ModelFile) -> None:
     """Check that each variable has a place of its own in the struct of values."""
     where: dict[str, str] = {}
+    arrays: dict[str, tuple[Variable, int]] = {}  # by their names: a variable, count of indexes
     for variable in file.variables.values():
         with placed(variable.place, variable.name):
             if variable.field and not file.code:
                 raise ModelFileError("field: expected code above the sections, whose struct has it")
-            other = where.setdefault(variable.field or variable.name, variable.name)
+            place = variable.field or variable.name
+            other = where.setdefault(place, variable.name)
             if other != variable.name:
-                raise ModelFileError(f"field: {shown(variable.field)} is the place of {other}")
+                raise ModelFileError(f"field: {shown(place)} is the place of {other}")
+            array, count = place.partition("[")[0], place.count("[")
+            first = arrays.setdefault(array, (variable, count))
+            if first != (variable, count) and (first[0].is_real, first[1]) != (
+                variable.is_real,
+                count,
+            ):
+                raise ModelFileError(f"field: {shown(place)} is not of the type of {first[0].name}")
     if file.hook is None:
         return
-    reals = {v.name for v in file.variables.values() if v.is_real}
+    reals = {v.name for v in file.of("where", "outputs") if v.is_real}
     read = [name for names in file.hook.reads.values() for name in names]
     for key, names, known in (
         ("indicators", file.hook.indicators, reals),
@@ -168,7 +183,7 @@ def _check_places(file: ModelFile) -> None:
     ):
         for name in names:
             if name not in known:
-                what = "a real variable" if known is reals else "a variable"
+                what = "a real entry of [where] or [outputs]" if known is reals else "a variable"
                 raise ModelFileError(f"[hook]: {key}: expected {what}, got {shown(name)}")
 
 

@@ -52,7 +52,8 @@ class Field:
         about = self.entry if isinstance(self.entry, dict) else {}
         texts = [about[key] for key in ("unit", "description") if type(about.get(key)) is str]
         comment = ": ".join(" ".join(text.split()) for text in texts).replace("*/", "* /")
-        last = [max(column) for column in zip(*(at for _, at in self.elements), strict=True)]
+        indexes = zip(*(at for _, at in self.elements), strict=False)  # refused where it is read
+        last = [max(column) for column in indexes]
         sizes = "".join(f"[{index + 1}]" for index in last)
         yield f"{self.c_type} {self.name}{sizes};" + (comment and f" /* {comment} */")
 
@@ -127,7 +128,8 @@ class Header:
             self.variables["modes"] = fields_of(names, self.stem)
         self.variables["calculated"] = fields(*CALCULATED, only_called=not has_hook)
         states = sum(len(field.elements) for field in self.variables["states"])
-        self.rates = [f"double {RATES}[{states}]; /* derivatives of the states */"] * has_hook
+        self.rates = [f"double {RATES}[{states}]; /* derivatives of the states */"]
+        self.rates *= has_hook and states > 0
 
     def all(self) -> Iterator["Header"]:
         """Yield this header and those that it includes."""

@@ -189,6 +189,7 @@ READ = {
     "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
     "field": _expect("a field of C such as damping[0]", str, FIELD.fullmatch),
     **dict.fromkeys(("sources", "indicators", "series"), LIST),
+    "reads": _expect("a table", dict, lambda _: True),
     "reach": _expect("true or false", bool, lambda _: True),
     **dict.fromkeys(("file", "derivative_of"), TEXT),
 }  # how values of keys are read; others are expressions

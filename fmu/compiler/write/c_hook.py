@@ -41,6 +41,7 @@ def parts(file: ModelFile, ranges: Mapping[str, list[Field]]) -> dict[str, list[
             *modes,
         ],
         "further_checks": [
+            "text[0] = '\\0';",
             f"if (!{file.path.stem}_check(values, text, size)) {{",
             "    return STATUS_INVALID_PARAMETERS;",
             "}",
