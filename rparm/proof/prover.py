@@ -21,6 +21,7 @@ ACCURATE = 2.0**-104  # a remainder that is small enough: in units of the state,
 ROUNDED = 2.0**-6  # or of this share of the state,
 SHARE = 2.0**-20  # or of this share of the hull's radius
 LEFT = 2.0**-30  # of what derivatives do to the set, may be left to their remainder
+PARALLEL, TINY = 100.0, 2.0**-1000  # condition of the sides of a frame; a size
 LAST_ORDER = 48
 SHORTEST = 2.0**-40  # a step over what remains of a communication step, at least
 AHEAD = 2.0**-32  # how far ahead, in what remains, the reason is looked for where none is known
@@ -369,8 +370,15 @@ class Stepper:
 
 
 def _frame(framed: arb_mat, y: arb_mat) -> arb_mat:
-    """Return the orthogonal factor, the longest side first; any invertible matrix would do."""
+    """Return the next frame, which may be any invertible matrix.
+
+    The sides as they are, which lets nothing grow, until they are nearly parallel; then their
+    orthogonal factor, the longest side first.
+    """
     sides = np.array([[float(x.mid()) for x in row] for row in framed.tolist()])
+    largest = np.abs(sides).max(axis=1, keepdims=True) + TINY
+    if np.linalg.cond(sides / largest) < PARALLEL:
+        return arb_mat(sides.tolist())
     sides = sides * [upper(x) for x in y.entries()]
     longest = np.argsort(-np.linalg.norm(sides, axis=0))
     return arb_mat(np.linalg.qr(sides[:, longest])[0].tolist())
