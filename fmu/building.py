@@ -220,10 +220,11 @@ def _reason(text: str) -> str:
     lines = text.splitlines() or ["no message"]
     of_linker = [x for x in lines if re.search(r"undefined (reference|symbol)|multiple def", x)]
     reason = [*of_linker, *(line for line in lines if "error" in line), *lines][0]
-    own = "|".join(re.escape(name) for name in C_FILES)
-    if re.search(rf"(^|[/\\])({own}):\d+:\d+: error: ", reason):
+    place = re.search(r"([^/\\]*):\d+:\d+: (fatal )?error: ", reason)
+    is_own = place is not None and place[1] in C_FILES
+    if is_own and not place[2]:
         return f"{reason:.300}; the C that rparm wrote is wrong: please report this with the file"
-    if of_linker or re.search(r":\d+:\d+: (fatal )?error: ", reason):
+    if of_linker or (place and not is_own):
         return f"{reason:.300}; the sources of [hook] are to be mended"
     # mostly the C is right: what fails is the compiler
     return f"{reason:.300}; gcc and clang need binutils, {INSTALL}"

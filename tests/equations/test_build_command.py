@@ -91,6 +91,8 @@ def test_what_to_install_is_said_where_no_compiler_is(
 @pytest.mark.parametrize("error, way_out", [
     ("cc: error: no assembler", "install"), ("equations.c:1:10: fatal error: no math.h", "install"),
     ("equations.c:7:3: error: no entry", "the C that rparm wrote is wrong: please report"),
+    ("../bead_events.c:7:3: error: no such", "the sources of .hook. are to be mended"),
+    ("ld: undefined reference to bead_check", "the sources of .hook. are to be mended"),
 ])  # fmt: skip
 def test_a_compiler_that_fails_is_named(tmp_path: Path, error: str, way_out: str) -> None:
     compiler = tmp_path / "cc"
