@@ -25,7 +25,6 @@ from tests.support.programs import RPARM, python, run
 MODEL = (ROOT / "examples" / "models" / "cart_and_pole.toml").read_text(encoding="utf-8")
 NAME = "CartAndPole"
 FMUS = (f"{NAME}.fmu", f"fmi3/{NAME}.fmu")
-ARCHIVE = "built.tar.xz"
 
 each_platform = pytest.mark.parametrize("row", PLATFORMS, ids=lambda row: row.name)
 

@@ -85,9 +85,8 @@ class Preprocessor:
         self,
         made: Callable[[Path], str | None],
         folders: Iterable[Path] = (),
-        ignored: Iterable[str] = (),
     ) -> None:
-        self.made, self.folders, self.ignored = made, list(folders), {*ignored}
+        self.made, self.folders = made, list(folders)
         self.defined: set[str] = set()
         self.files: list[Path] = []
         self.lines: list[str] = []
@@ -151,7 +150,7 @@ class Preprocessor:
 
     def include(self, system: str | None, own: str | None, path: Path, place: str) -> None:
         """Add an included file, once."""
-        if (system or own) in (*self.ignored, *SYSTEM_HEADERS):
+        if (system or own) in SYSTEM_HEADERS:
             return
         if own is None:
             raise CTextError(
@@ -188,11 +187,10 @@ def _joined(found: re.Match[str]) -> str:
 def read(
     path: Path,
     folders: Iterable[Path] = (),
-    ignored: Iterable[str] = (),
     made: Callable[[Path], str | None] = lambda _: None,
 ) -> Program:
-    """Read the declarations of a file, with includes from `folders` but for `ignored` headers."""
-    preprocessor = Preprocessor(made, folders, ignored)
+    """Read the declarations of a file, with includes from `folders`."""
+    preprocessor = Preprocessor(made, folders)
     preprocessor.add(path, path.name)
     return parsed("\n".join(preprocessor.lines), preprocessor.files)
 
