@@ -115,7 +115,7 @@ class Series:
         """Return roots, the plan of those that move, and inputs whose products are in a branch."""
         if not self.is_wide:
             used = inputs_in_products(roots)
-            guarded = [where_used(self.graph, used, root) for root in roots] if used else roots
+            guarded = where_used(self.graph, used, roots) if used else roots
             became = with_guards(guarded, self.leaves.conditions, self._cost)
             guarded = [became[root] for root in guarded]
             plan = plan_with_partials(self.graph, [r for r in guarded if r.moves], self._cost)
@@ -468,16 +468,16 @@ def inputs_in_products(roots: Iterable[Value]) -> list[Value]:
     return [*dict.fromkeys(found)] if len(found) >= FEWEST_PRODUCTS else []
 
 
-def where_used(graph: Graph, used: Iterable[Value], root: Value) -> Value:
+def where_used(graph: Graph, used: Iterable[Value], roots: list[Value]) -> list[Value]:
     """Leave out products with inputs where these are 0 in all orders."""
     are_used, zero, found = graph.value("mode", name=USED), graph.number(0.0), {}
-    for value in in_order([root]):
+    for value in in_order(roots):
         given = [found[x] for x in value.arguments]
         new = graph.value(value.op, *given, name=value.name, number=value.number)
         if value.op == "*" and all(x.moves for x in given) and {*given} & {*used}:
             new = graph.value("if", are_used, new, zero)
         found[value] = new
-    return found[root]
+    return [found[root] for root in roots]
 
 
 def multiplied(factor: Operand, term: Operand) -> Operand:
