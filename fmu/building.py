@@ -39,7 +39,7 @@ INSTALL = 'pip install "rparm[build]" installs zig'
 
 
 @dataclass(frozen=True)
-class Hook:
+class HookFiles:
     """C files beside a file with equations, with the headers that are made for them."""
 
     sources: list[Path]
@@ -47,7 +47,7 @@ class Hook:
     root: Path | None  # folder of all that they include
 
     @classmethod
-    def of(cls, file: ModelFile, work: Path) -> Hook:
+    def of(cls, file: ModelFile, work: Path) -> HookFiles:
         """Write the headers of a file with a hook; without one there is nothing."""
         if file.hook is None:
             return cls([], [], None)
@@ -89,7 +89,7 @@ def build(
     }
     _write(work, texts)
     document([work / "README.md"], work / "modelDescription.xml", work / "documentation")
-    hook = Hook.of(file, work)
+    hook = HookFiles.of(file, work)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         libraries = list(pool.map(lambda one: _libraries(file.name, one, work, hook), runtimes))
     entries = {}
@@ -110,7 +110,9 @@ def build(
     return entries
 
 
-def _libraries(name: str, runtime: Runtime, work: Path, hook: Hook) -> dict[str, tuple[str, Path]]:
+def _libraries(
+    name: str, runtime: Runtime, work: Path, hook: HookFiles
+) -> dict[str, tuple[str, Path]]:
     """Link the shared object for one platform; return name and file by the version of FMI."""
     folder = work / runtime.content["platform"]
     folder.mkdir()
@@ -125,7 +127,9 @@ def _libraries(name: str, runtime: Runtime, work: Path, hook: Hook) -> dict[str,
     return {x: (f"{place}/{file}", folder / x / file) for x, place in places.items()}
 
 
-def _write_sources(version: str, runtime: Runtime, work: Path, hook: Hook, output: Path) -> None:
+def _write_sources(
+    version: str, runtime: Runtime, work: Path, hook: HookFiles, output: Path
+) -> None:
     """Write the folder sources/ of an FMU: all that its shared object consists of."""
     sources = [*(work / name for name in C_FILES), *hook.sources]
     own = Library("model", sources, [work, *hook.include], None)

@@ -79,12 +79,10 @@ class StructFields:
         self.rates = {name: Field(rates, i) for i, name in enumerate(states)}
 
     def value(self, name: str) -> Field:
-        """A number."""
+        """A variable of any kind."""
         return self.places[name]
 
-    def count(self, name: str) -> Field:
-        """A condition, whole number or enumeration."""
-        return self.places[name]
+    count = value
 
     def rate(self, name: str) -> Field:
         """The derivative of a state."""

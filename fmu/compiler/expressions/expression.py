@@ -28,7 +28,7 @@ SHOWN = 30  # characters of the text in a message
 CONDITIONAL, OR, AND, NOT, RELATION, SUM, PRODUCT, SIGN, POWER = range(1, 10)
 BINDING = {"if": CONDITIONAL, "or": OR, "and": AND, "+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT}
 BINDING |= {"**": POWER} | dict.fromkeys((*RELATIONS, *EQUALITIES), RELATION)
-Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
+Item = TypeVar("Item", bound=Any)  # hashable; its `arguments` are of the same type
 OPERATIONS: dict[str, Callable[..., float]] = {
     "+": operator.add,
     "-": operator.sub,

@@ -155,7 +155,7 @@ def _read_hook(file: ModelFile, head: dict[str, Any]) -> None:
 
 
 def _check_places(file: ModelFile) -> None:
-    """Check that each variable has a place of its own in the struct of values."""
+    """Check that no two variables have the same place in the struct of values."""
     where: dict[str, str] = {}
     arrays: dict[str, tuple[Variable, int]] = {}  # by their names: a variable, count of indexes
     for variable in file.variables.values():
@@ -167,12 +167,9 @@ def _check_places(file: ModelFile) -> None:
             if other != variable.name:
                 raise ModelFileError(f"field: {shown(place)} is the place of {other}")
             array, count = place.partition("[")[0], place.count("[")
-            first = arrays.setdefault(array, (variable, count))
-            if first != (variable, count) and (first[0].is_real, first[1]) != (
-                variable.is_real,
-                count,
-            ):
-                raise ModelFileError(f"field: {shown(place)} is not of the type of {first[0].name}")
+            first, first_count = arrays.setdefault(array, (variable, count))
+            if (first.is_real, first_count) != (variable.is_real, count):
+                raise ModelFileError(f"field: {shown(place)} is not of the type of {first.name}")
     if file.hook is None:
         return
     reals = {v.name for v in file.of("where", "outputs") if v.is_real}

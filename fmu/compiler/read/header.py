@@ -138,7 +138,7 @@ class Header:
             yield from header.all()
 
     def outer(self) -> list["Header"]:
-        """Return this header; those that it includes if it has no parameters of its own."""
+        """Return this header or, if it declares no parameters, the headers that it includes."""
         return [self] if self.own else self.inner
 
     def parameters(self) -> Iterator[tuple[Place, str]]:

@@ -1,6 +1,6 @@
 """What the C of a model has of its hook: C by hand decides events, and sets modes.
 
-Its value structure is that of NAME_values.h, its struct model NAME_model.
+It uses the structure of values of NAME_values.h; its struct model is NAME_model.
 """
 
 from collections.abc import Mapping
@@ -54,11 +54,13 @@ def parts(file: ModelFile, ranges: Mapping[str, list[Field]]) -> dict[str, list[
 
 def modes_of_values(file: ModelFile) -> list[str]:
     """Return statements that let `values` have the modes in effect at its states and inputs."""
-    first = [file.of(section)[:1] for section in ("states", "inputs")]
-    places = [f"&values->{file.fields.value(v.name)}" for found in first for v in found]
-    return (
-        _in_effect(file, *[*places, "NULL"][:2]) if first[0] else _in_effect(file, "NULL", *places)
-    )
+    return _in_effect(file, _first_of(file, "states"), _first_of(file, "inputs"))
+
+
+def _first_of(file: ModelFile, section: str) -> str:
+    """Return the address in `values` of the first variable of a section."""
+    variables = file.of(section)
+    return f"&values->{file.fields.value(variables[0].name)}" if variables else "NULL"
 
 
 def _in_effect(file: ModelFile, state: str, of_input: str) -> list[str]:

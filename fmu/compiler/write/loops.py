@@ -141,7 +141,7 @@ def pieces(item: Item, named: Mapping[Place, Constant]) -> list[Operand]:
 
 
 def _block(head: str, bodies: Iterable[Iterable[str]]) -> Iterator[str]:
-    """Yield the lines of a block, from those of its bodies."""
+    """Yield the lines of a block; those of its bodies are given."""
     yield head
     for i, body in enumerate(bodies):
         if i:
