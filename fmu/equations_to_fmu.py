@@ -18,6 +18,7 @@ from program import WrongInputError
 
 # absolute tolerance of a state over its nominal value, at the default relative tolerance
 TOLERANCE = 1e-10
+MOST_SHOWN = 20  # entries of a block
 MISTAKES = (ModelFileError, WrongInputError, OSError)
 
 
@@ -49,6 +50,8 @@ def main() -> int:
         return 2
     for warning in _warnings(file):
         print(f"warning: {warning}", file=sys.stderr)
+    for note in _notes(file):
+        print(f"note: {note}", file=sys.stderr)
     print("\n".join(names))
     return 0
 
@@ -63,6 +66,15 @@ def _warnings(file: ModelFile) -> Iterator[str]:
                 f"[states]: {state.name}: starts at {state.start:g}, but its tolerance is "
                 f"{TOLERANCE * nominal:g}: a nominal value of its usual size makes it smaller"
             )
+
+
+def _notes(file: ModelFile) -> Iterator[str]:
+    """Yield the blocks of entries that need each other: some of them may not be meant."""
+    for block in dict.fromkeys(file.blocks.values()):
+        names, kind = block.names, "linear" if block.is_linear else "nonlinear"
+        more = f", ... ({len(names)})" if len(names) > MOST_SHOWN else ""
+        together = "solved together" if len(names) > 1 else "solved"
+        yield f"{', '.join(names[:MOST_SHOWN])}{more}: {together}, {kind}"
 
 
 if __name__ == "__main__":

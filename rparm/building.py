@@ -16,7 +16,8 @@ from rparm.files import read_toml, whole, written
 from rparm.interruption import run_group, temporary_folder, uninterrupted
 
 EQUATIONS = ".toml"  # suffix of their files
-WARNINGS, WARNING = "warnings", "warning: "  # what is kept beside the files, and how a line begins
+WARNINGS = "warnings"  # what is kept beside the files
+WARNING, NOTE = "warning: ", "note: "  # how its lines begin
 
 # packages that the program imports
 NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pycparser")
@@ -58,7 +59,7 @@ def build(
         project.refuse_other(Path(file), tomllib.loads(text), "build")
     runtimes = project.runtimes(platforms, web)
     with temporary_folder() as work:
-        kept, *fmus = _kept(Path(file), runtimes, not (platforms or web), work)
+        kept, *fmus = _kept(Path(file), runtimes, not (platforms or web), work, notes=lock)
         paths = Path(output) / fmus[0], Path(output) / fmus[1]
         # the cache may have it from a file of another name
         made = {_lock(Path(file)): work / kept} if lock else {}
@@ -87,8 +88,13 @@ def _lock(file: Path) -> Path:
     return file.with_suffix(".lock.toml")
 
 
-def _kept(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -> list[str]:
-    """Make the lock file and the FMUs in the folder `work`, or take them from the cache."""
+def _kept(
+    file: Path, runtimes: list[Path], of_this_machine: bool, work: Path, notes: bool
+) -> list[str]:
+    """Make the lock file and the FMUs in the folder `work`, or take them from the cache.
+
+    notes: whether those are printed, not only warnings.
+    """
     cache = build_cache.of_user()
 
     def parts() -> list[object]:
@@ -108,7 +114,9 @@ def _kept(file: Path, runtimes: list[Path], of_this_machine: bool, work: Path) -
                 cache.put(of_lock, found)
     warnings = found.pop(WARNINGS).decode("utf-8", "surrogateescape")
     for line in warnings.splitlines():
-        print(line.replace(WARNING, f"{WARNING}{file}: ", 1), file=sys.stderr)
+        kind = NOTE if line.startswith(NOTE) else WARNING
+        if notes or kind == WARNING:
+            print(line.replace(kind, f"{kind}{file}: ", 1), file=sys.stderr)
     for name, content in found.items():
         (work / name).parent.mkdir(exist_ok=True)
         (work / name).write_bytes(content)

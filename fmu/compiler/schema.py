@@ -53,7 +53,8 @@ KEYS: dict[str, Schema] = {  # start: by the type
     **dict.fromkeys(("x", "y"), {"anyOf": [ROWS, TEXT]}),  # lists, or columns of the file
     **dict.fromkeys(("reinit", "set"), {"type": "object", "additionalProperties": NEW}),
     "where": {"type": "object", "propertyNames": WORD, "additionalProperties": EXPRESSION},
-    **dict.fromkeys(("derivative", "value", "when", "while", "every", "offset", FOR), EXPRESSION),
+    **dict.fromkeys(("derivative", "value", "equation", "when", "while"), EXPRESSION),
+    **dict.fromkeys(("every", "offset", FOR), EXPRESSION),
     "nominal": ABOVE_0,
     "start": {},
     "variability": {"enum": ["fixed", "discrete"]},

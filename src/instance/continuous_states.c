@@ -14,6 +14,9 @@ enum status instance_enter_continuous_time(struct instance *instance) {
         instance->state.phase = PHASE_CONTINUOUS_TIME;
         instance_forget_unhandled(instance);
         instance_note_inputs(instance);
+        if (instance->is_integrated_outside) {
+            instance_move_anchors(instance);
+        }
     }
     return status;
 }
@@ -27,6 +30,7 @@ void instance_enter_event_mode(struct instance *instance) {
 
 bool instance_complete_step(struct instance *instance) {
     instance_note_inputs(instance);
+    instance_move_anchors(instance);
     return instance_has_missed_event(instance);
 }
 

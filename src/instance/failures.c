@@ -170,6 +170,17 @@ static void add_cause(const struct place *place, const char *text, struct explan
     add_values(place, cause != NULL ? cause->text : text, to);
 }
 
+/* Adds which equations have no solution. Returns false if all have one. */
+static bool add_unsolved(const struct place *place, struct explanation *to) {
+    const struct model *model = place->instance->model;
+    char text[400];
+    if (model->explain == NULL || !model->explain(place->values, place->t, text, sizeof text)) {
+        return false;
+    }
+    add(to, "%s", text);
+    return true;
+}
+
 /* ---- Explanations --------------------------------------------------------------------------- */
 
 /* Adds "derivative of " and the name of the state, or the name of the variable. */
@@ -209,7 +220,12 @@ void instance_explain_text(struct instance *instance, const char *text,
     char *values = instance->first_derivatives;
     const struct place place = {instance, values, instance->state.time.s};
     memcpy(values, instance->memory.values, instance->model->values_size);
-    if (instance->model->outputs(values, place.t) == STATUS_OK) {
+    if (instance->model->explain != NULL) {
+        add(explanation, "; ");
+        explanation->length *= add_unsolved(&place, explanation);
+        explanation->text[explanation->length] = '\0';
+    }
+    if (explanation->length == 0 && instance->model->outputs(values, place.t) == STATUS_OK) {
         add_cause(&place, text, explanation);
     }
 }
@@ -225,8 +241,8 @@ static const double *first_not_finite(const double derivatives[], size_t count) 
 }
 
 /* Explains why the equations, or their derivatives, are not finite where the integrator has met
- * that. */
-static void explain_evaluation(struct instance *instance, struct explanation *to) {
+ * that; of a step that has failed otherwise, only why there is no solution. */
+static void explain_evaluation(struct instance *instance, bool is_failure, struct explanation *to) {
     const struct model *model = instance->model;
     const size_t count = count_of(model->dx);
     double t;
@@ -243,7 +259,7 @@ static void explain_evaluation(struct instance *instance, struct explanation *to
         doubles_of(values, model->inputs)[i] =
             polynomial_value(&instance->memory.active_inputs[i], t);
     }
-    if (model->outputs(values, place.t) != STATUS_OK) {
+    if (add_unsolved(&place, to) || !is_failure || model->outputs(values, place.t) != STATUS_OK) {
         return;
     }
     const double *dx = doubles_of(values, model->dx);
@@ -261,15 +277,40 @@ static void explain_evaluation(struct instance *instance, struct explanation *to
     }
 }
 
+/* Parts of the time since the restart after which a motion that has failed is looked at. */
+static const double ahead[] = {1e-12, 1e-9, 1e-6};
+
+/* Adds which equations have no solution shortly ahead of the present state. */
+static void explain_ahead(struct instance *instance, struct explanation *to) {
+    const struct model *model = instance->model;
+    const struct instance_state *state = &instance->state;
+    char *values = instance->first_derivatives;
+    const double *x = doubles_of(instance->memory.values, model->states);
+    memcpy(values, instance->memory.values, model->values_size);
+    if (model->explain == NULL || model->outputs(values, state->time.s) != STATUS_OK) {
+        return;
+    }
+    for (size_t k = 0; to->length == 0 && k < sizeof ahead / sizeof ahead[0]; k++) {
+        const double h = ahead[k] * (state->latest_time + fabs(state->statistics.last_step));
+        const struct place place = {instance, values, state->time.s + h};
+        for (size_t i = 0; i < count_of(model->states); i++) {
+            doubles_of(values, model->states)[i] = x[i] + h * doubles_of(values, model->dx)[i];
+        }
+        (void)add_unsolved(&place, to);
+    }
+}
+
 void instance_explain_step(struct instance *instance, enum status status,
                            struct explanation *explanation) {
     if (instance->integrator == NULL) {
         return;
     }
-    if (status == STATUS_NOT_FINITE) {
-        explain_evaluation(instance, explanation);
+    explain_evaluation(instance, status == STATUS_NOT_FINITE, explanation);
+    if (explanation->length == 0) {
+        explain_ahead(instance, explanation);
     }
-    if (status == STATUS_TOO_MANY_STEPS && instance->configured.method != INTEGRATOR_CVODE_BDF &&
+    if (explanation->length == 0 && status == STATUS_TOO_MANY_STEPS &&
+        instance->configured.method != INTEGRATOR_CVODE_BDF &&
         integrator_seems_stiff(instance->integrator)) {
         add(explanation,
             "%s: the equations seem to be stiff, for which solver_method = cvode_bdf is made",
@@ -280,6 +321,10 @@ void instance_explain_step(struct instance *instance, enum status status,
 enum status instance_field_not_finite(struct instance *instance, size_t offset) {
     const struct place place = {instance, instance_shown_values(instance), instance->state.time.s};
     struct explanation why = {.length = 0};
+    if (add_unsolved(&place, &why)) {
+        message_write(&instance->sink, STATUS_NOT_FINITE, "%s", why.text);
+        return STATUS_NOT_FINITE;
+    }
     if (expression_at(&place, offset) == NULL) {
         add_name(instance, offset, &why);
         return instance_not_finite(instance, why.text);

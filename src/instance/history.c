@@ -203,6 +203,7 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     if (has_new_parameters) {
         activate(instance, model->parameters);
     }
+    instance_move_anchors(instance);
     activate(instance, memory->written);
     instance->parameters_are_active = true;
     instance_note_inputs(instance);

@@ -19,8 +19,8 @@ static size_t aligned(size_t size) {
 /* Locates the parts that a step writes: no parameters, except the restart's. */
 static void locate_written(const struct model *model, struct instance_memory *memory) {
     const struct model_events events = events_of(model);
-    const struct range ranges[] = {model->inputs, model->states, events.modes,
-                                   events.discrete_states, events.discrete_inputs};
+    const struct range ranges[] = {model->inputs,          model->states,          events.modes,
+                                   events.discrete_states, events.discrete_inputs, model->anchors};
     size_t begin = model->values_size;
     size_t end = 0;
     for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
@@ -183,6 +183,7 @@ static enum status setup(struct instance *instance) {
     instance->ode.rhs = instance_rhs;
     instance->ode.jacobian = instance_jacobian;
     instance->ode.band = model->band;
+    instance->ode.may_end = model->explain != NULL;
     instance->ode.context = instance;
     if (model->series != NULL) {
         instance->ode.series = instance_series;
@@ -326,6 +327,7 @@ enum status instance_exit_initialization(struct instance *instance) {
         status = instance_update_modes(instance, NULL);
     }
     if (status == STATUS_OK) {
+        instance_move_anchors(instance);
         instance->state.phase = PHASE_STEPPING;
     }
     return status;

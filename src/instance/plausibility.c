@@ -153,9 +153,8 @@ static bool check_limits(const struct instance *instance, const char *values) {
     return true;
 }
 
-/* Checks that discrete states are finite, also those that are no variables. */
-static bool check_kept(const struct instance *instance, const char *values) {
-    const struct range kept = events_of(instance->model).discrete_states;
+/* Checks that discrete states and anchors are finite, also those that are no variables. */
+static bool check_kept(const struct instance *instance, const char *values, struct range kept) {
     for (size_t i = 0; i < count_of(kept); i++) {
         const double state = ((const double *)(const void *)(values + kept.offset))[i];
         const struct named_value value = {"a discrete state", state, isfinite(state)};
@@ -245,7 +244,10 @@ static bool check_next_time(const struct instance *instance, const struct instan
 
 /* Checks that the instance can have a value structure. */
 static bool check_structure(const struct instance *instance, const char *values) {
-    return check_limits(instance, values) && check_kept(instance, values);
+    const struct model *model = instance->model;
+    return check_limits(instance, values) &&
+           check_kept(instance, values, events_of(model).discrete_states) &&
+           check_kept(instance, values, model->anchors);
 }
 
 /* Checks the event at which the last step ended: an unhandled event has an indicator or the time as

@@ -219,7 +219,7 @@ static void transfer_values(struct codec *codec, const struct instance *instance
     }
 }
 
-/* Transfers modes and discrete states, declared as variables or not. */
+/* Transfers modes, discrete states and anchors, declared as variables or not. */
 static void transfer_kept(struct codec *codec, const struct model *model, char *values) {
     const struct model_events events = events_of(model);
     int *modes = (int *)(void *)(values + events.modes.offset);
@@ -229,6 +229,9 @@ static void transfer_kept(struct codec *codec, const struct model *model, char *
     }
     for (size_t i = 0; i < count_of(events.discrete_states); i++) {
         codec_real(codec, &kept[i]);
+    }
+    for (size_t i = 0; i < count_of(model->anchors); i++) {
+        codec_real(codec, &doubles_of(values, model->anchors)[i]);
     }
 }
 

@@ -172,6 +172,14 @@ static inline double instance_next_time(const struct instance *instance) {
                                                        : INFINITY;
 }
 
+/* Lets the searches for solutions of equations begin at those of the present values. */
+static inline void instance_move_anchors(struct instance *instance) {
+    if (instance->model->anchor != NULL) {
+        instance->model->anchor(instance->memory.values, instance->state.time.s);
+        instance->outputs_are_valid = false;
+    }
+}
+
 /* Returns the number of largest_inputs. */
 static inline size_t instance_noted_inputs(const struct model *model) {
     return events_of(model).errors != NULL ? count_of(model->inputs) : 0;

@@ -275,6 +275,28 @@ static bool is_at_rest(const struct instance *instance) {
                                                  events->is_at_rest(instance->memory.values));
 }
 
+/* Advances by the restarts that anchors need. */
+static enum status advance_by_restarts(struct step *step) {
+    struct instance *instance = step->instance;
+    const struct instance_state *state = &instance->state;
+    for (;;) {
+        const enum status status =
+            step->options->accept == NULL ? advance(step) : advance_observed(step);
+        const bool may_be_lost = status == STATUS_NOT_FINITE || status == STATUS_NO_CONVERGENCE;
+        if (!may_be_lost || instance->model->anchor == NULL || state->latest_time <= 0.0 ||
+            steps_left(step) <= 0) {
+            return status;
+        }
+        instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
+        move_inputs(instance, clock_difference(state->time, step->begin));
+        const enum status restarted =
+            instance_prepare_history(instance, step->end, CONTINUE_AFTER_EVENT);
+        if (restarted != STATUS_OK) {
+            return restarted;
+        }
+    }
+}
+
 /* Integrates to step->until, or to a state event before, which it writes to step->triggered. */
 static enum status integrate(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
@@ -297,7 +319,7 @@ static enum status integrate(struct step *step, enum continuation continuation) 
     if (status != STATUS_OK) {
         return status;
     }
-    status = step->options->accept == NULL ? advance(step) : advance_observed(step);
+    status = advance_by_restarts(step);
     step->is_stuck = status != STATUS_OK;
     // a step that ended early cannot be replayed: its end was not known when it began
     instance_note_part(instance, status,
@@ -435,6 +457,7 @@ static bool begin_motion(struct step *step, enum continuation *continuation) {
     const struct model *model = instance->model;
     set_part(step);
     if (model->states.size == 0) {
+        instance_move_anchors(instance);
         *continuation = CONTINUE_AFTER_CHANGE;
         return model->events != NULL;
     }

@@ -62,6 +62,15 @@ static inline enum status problem_rhs(struct problem *problem, double t, const d
     return problem_fail(problem, t, x);
 }
 
+/* Distance from the end of a solution that is as good as none, over the time since the restart. */
+#define PROBLEM_END 1e-10
+
+/* True if a solution that is known at `begin` and unknown at t ends so near that the end has been
+ * found. */
+static inline bool problem_has_ended(const struct problem *problem, double begin, double t) {
+    return problem->ode.may_end && t >= begin && t - begin <= PROBLEM_END * begin;
+}
+
 /* True if the method is stuck in front of a time at which the right-hand side cannot be evaluated.
  */
 static inline bool problem_is_stuck(const struct problem *problem) {

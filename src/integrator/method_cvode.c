@@ -370,6 +370,9 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
                      stopped_at, CV_ONE_STEP);
         sundials_get_state(&cvode->base, x);
         internal = *stopped_at;
+        if (flag >= 0 && problem_has_ended(problem, internal, problem->failed_at)) {
+            return CV_RHSFUNC_FAIL;
+        }
         if (flag >= 0 && location_is_active(&problem->location) && internal > before) {
             cvode->search_status = search(cvode, before, internal);
             if (cvode->search_status != STATUS_OK) {
@@ -407,7 +410,8 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
         flag = CVodeSetStopTime(cvode->solver, problem->horizon);
     }
     cvode->columns.count = 0;
-    if (flag == CV_SUCCESS && (problem->observer != NULL || is_searched)) {
+    const bool is_watched = problem->observer != NULL || is_searched || problem->ode.may_end;
+    if (flag == CV_SUCCESS && is_watched) {
         flag = integrate_watched(cvode, t, max_steps, stopped_at, x, is_cut_short);
     }
     if (flag < 0 || *is_cut_short) {

@@ -139,7 +139,10 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
             if (status != STATUS_OK) {
                 return status;
             }
-        } else if (series->begin + part * series->time_scale > series->begin) {
+        } else if (series->begin + part * series->time_scale > series->begin &&
+                   (isfinite(defect) ||
+                    !problem_has_ended(series->problem, series->begin,
+                                       series->begin + *step * series->time_scale))) {
             *step = part;
             work->failed_steps++;
         } else {

@@ -44,7 +44,8 @@ struct ode {
     const struct series *rows; /* what its rows are; NULL if they are states only */
     ode_series *series;        /* for INTEGRATOR_TAYLOR only; NULL if the model has none */
     size_t series_row_count;   /* >= state_count if there is a series */
-    size_t state_count;        /* > 0 */
+    bool may_end; /* true if solutions may end: then a method does not creep up to such an end */
+    size_t state_count; /* > 0 */
     void *context;
 };
 

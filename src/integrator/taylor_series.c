@@ -186,6 +186,28 @@ static inline double missed(double derivative, double of_polynomial) {
     return difference <= 0.0 ? 0.0 : difference;
 }
 
+/* Part of the way of a solution by which its series may miss it. */
+static const double most_missed = 1e-2;
+
+/* True if the solutions of equations at s are those to which the series lead, not others. */
+static bool is_continued(const struct taylor_series *series, double s) {
+    const struct series *rows = series->problem->ode.rows;
+    for (size_t k = 0; rows != NULL && k < rows->solution_count; k++) {
+        const double *row = series->row[rows->solutions[k]];
+        double expected = 0.0;
+        double way = 0.0; // with all terms of one sign
+        for (int order = series->order; order >= 1; order--) {
+            expected = (expected + row[order]) * s;
+            way = (way + fabs(row[order])) * s;
+        }
+        const double found = series->end_row[rows->solutions[k]][0] - row[0];
+        if (!(fabs(found - expected) <= most_missed * way + 1e-12 * fabs(row[0]))) {
+            return false;
+        }
+    }
+    return true;
+}
+
 enum status taylor_series_measure_defect(struct taylor_series *series, double s, double end_x[],
                                          double end_dx[], double *defect) {
     const size_t n = series->problem->ode.state_count;
@@ -201,7 +223,7 @@ enum status taylor_series_measure_defect(struct taylor_series *series, double s,
         return status;
     }
     series->end = location_is_active(&series->problem->location) ? NAN : end;
-    *defect = 0.0;
+    *defect = is_continued(series, s) ? 0.0 : INFINITY;
     for (size_t i = 0; i < n; i++) {
         *defect += s * missed(end_row[i][1], end_dx[i]) * series->weight[i];
     }

@@ -176,6 +176,10 @@ struct series {
     /* What may be nothing at the begin of a step and large within. NULL if there is nothing. */
     const struct series_inner *inner;
     size_t inner_count, inner_stride;
+
+    /* Rows of solutions of equations, which another solution may replace where a step ends. */
+    const size_t *solutions;
+    size_t solution_count;
 };
 
 /* ---- Jacobian ------------------------------------------------------------------------------- */
@@ -244,6 +248,18 @@ struct model {
 
     /* NULL if the model has no modes. */
     const struct model_events *events;
+
+    /* Where solutions of equations are searched: double[], unknowns at the last restart. */
+    struct range anchors;
+
+    /* Writes the anchors: solutions with the values that are set, searched from the old anchors.
+     * The right-hand side and the other pure functions have values only where solutions are near
+     * the anchors. NULL if there are none. */
+    void (*anchor)(void *values, double t);
+
+    /* Writes one line that says which equations have no solution with the values that are set, to
+     * text (size bytes). Returns false if all have one. NULL if none need each other. */
+    bool (*explain)(const void *values, double t, char *text, size_t size);
 
     /* Expressions of calculated fields; NULL if the model has no file. */
     const struct expression *expressions;

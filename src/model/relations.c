@@ -128,12 +128,66 @@ static bool update_modes(const struct call *call, bool is_exact) {
     return changes || moves;
 }
 
-/* Repeats update_modes until no mode changes. Relations depend on each other in no circle, so that
- * each round decides at least one more for good. */
-static void update_modes_until_stable(const struct call *call, bool is_exact) {
-    for (int count = 0; count < call->model->relation_count && update_modes(call, is_exact);
-         count++) {
+/* Updates the mode of the first relation whose distance contradicts it. Returns false if there is
+ * none. */
+static bool update_first_mode(const struct call *call, bool is_exact) {
+    const struct compared *compared = call->room.compared;
+    compare(call, call->room.tolerance, call->room.compared);
+    for (int k = 0; k < call->model->relation_count; k++) {
+        const int holds = holds_at(&call->model->relation[k], compared[k].distance);
+        const bool follows = is_exact || (is_sure(&compared[k]) && !call->room.turned[k]);
+        if (follows && !call->model->relation[k].is_timed && call->holds[k] != holds) {
+            call->holds[k] = holds;
+            return true;
+        }
     }
+    return false;
+}
+
+/* Rounds for relations in circles, for each of which there may be several. */
+enum { ROUNDS_IN_CIRCLES = 20 };
+
+/* Repeats update_modes until no mode changes. Without circles each round decides at least one
+ * relation more for good. In circles, where all modes at once find no end, the first wrong one
+ * changes alone: Murty's rule for linear complementarity. */
+static void update_modes_until_stable(const struct call *call, bool is_exact) {
+    const int relations = call->model->relation_count;
+    bool changes = true;
+    for (int count = 0; changes && count < relations; count++) {
+        changes = update_modes(call, is_exact);
+    }
+    const int rounds =
+        call->model->is_circular != NULL && changes ? ROUNDS_IN_CIRCLES * relations : 0;
+    for (int count = 0; changes && count < rounds; count++) {
+        changes = update_first_mode(call, is_exact);
+    }
+}
+
+/* True if the distance of a relation contradicts its mode or, at the limit, will at once. */
+static bool is_contradicted(const struct call *call, int k) {
+    const struct compared *compared = &call->room.compared[k];
+    compare(call, call->room.tolerance, call->room.compared);
+    const double slope = call->holds[k] ? compared->slope : -compared->slope;
+    const int holds = holds_at(&call->model->relation[k], compared->distance);
+    return is_near(compared) ? slope < 0.0 : is_sure(compared) && holds != call->holds[k];
+}
+
+/* Returns a relation in a circle that is contradicted whether it holds or not; -1 if there is none.
+ */
+static int contradiction(const struct call *call) {
+    const bool *is_circular = call->model->is_circular;
+    for (int k = 0; is_circular != NULL && k < call->model->relation_count; k++) {
+        if (!is_circular[k] || !is_contradicted(call, k)) {
+            continue;
+        }
+        call->holds[k] = !call->holds[k];
+        const bool is_wrong = is_contradicted(call, k);
+        call->holds[k] = !call->holds[k];
+        if (is_wrong && call->room.compared[k].used) {
+            return k;
+        }
+    }
+    return -1;
 }
 
 /* Puts relations that the time takes over their limits on their later sides. Returns true if some
@@ -592,6 +646,17 @@ enum status relations_update(const struct relations *model, struct relations_roo
     bool fires = true;
     for (int count = 0; status == STATUS_OK && fires && count <= event->max_events; count++) {
         status = run_due_events(&call, event, count == event->max_events, &fires);
+    }
+    const int wrong = status == STATUS_OK && !fires ? contradiction(&call) : -1;
+    if (wrong >= 0) {
+        if (event->reason != NULL) {
+            (void)snprintf(
+                event->reason, event->reason_size,
+                "%.150s contradicts itself: what follows from it makes it false where it holds, "
+                "and true where it does not",
+                model->names[wrong]);
+        }
+        return STATUS_INTERNAL;
     }
     if (status == STATUS_OK && fires) {
         char more[100];

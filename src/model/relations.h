@@ -75,6 +75,9 @@ struct relations {
     const struct segment *segment;
     const struct count *count;
     const double *nominal;           /* of each state */
+    const bool *is_circular;         /* of each relation: its distance follows from its own mode.
+                                        NULL if there is none */
+    const char *const *names;        /* of relations; NULL if none is circular */
     const char *const *change_names; /* of events, then of samplers */
     const char *const *every_names;  /* of the period of each sampler */
     const struct assignment *assignment;

@@ -71,7 +71,9 @@ class Model:
         warnings = ["-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-unused-parameter"]
         command = ["cc", "-std=c17", level, "-ffp-contract=off", "-shared", "-fPIC", *warnings]
         shared = ROOT / "src" / "model"
-        runtime = [shared / name for name in ("relations.c", "domains.c", "random.c")]
+        runtime = [
+            shared / name for name in ("algebraic.c", "relations.c", "domains.c", "random.c")
+        ]
         sources = [folder / "equations.c", *runtime]
         files = [*sorted(shared.glob("*.?")), folder / "equations.h", folder / "equations.c"]
         texts = [path.read_bytes() for path in files]

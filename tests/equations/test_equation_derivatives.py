@@ -5,7 +5,7 @@ And the arm from a file with equations against the one that is written by hand.
 
 import random
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import mpmath
@@ -42,8 +42,8 @@ def expression(chance: random.Random, depth: int) -> str:
     return f"({inner} {chance.choice('+-*')} {other}) / 3"
 
 
-def reference(text: str) -> Callable[..., mpmath.mpf]:
-    return eval(f"lambda p, u, x, y, time: {text}", {**PYTHON, "__builtins__": {}})
+def reference(text: str, names: Sequence[str] = (*NAMES, "time")) -> Callable[..., mpmath.mpf]:
+    return eval(f"lambda {', '.join(names)}: {text}", {**PYTHON, "__builtins__": {}})
 
 
 @pytest.fixture(scope="module", params=range(6))

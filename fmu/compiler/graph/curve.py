@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from ..expressions.expression import in_order
+from . import algebraic
 from .graph import NOTED, STILL, Graph, Value, is_number, is_runtime, is_steep
 
 Rates = Callable[[Value], tuple[Value, Value] | None]  # of a leaf; None: it rests
-LINEAR = ("+", "-", "negative", "moving_as", "element", "if")
+LINEAR = ("+", "-", "negative", "moving_as", "element", "if", "component", "factors")
 
 
 class Curve:
@@ -94,6 +95,8 @@ class Curve:
         match y.op:
             case op if op in LINEAR:
                 return graph.chain(y, dd)
+            case op if op in algebraic.VECTORS:
+                return algebraic.second(graph, y, self._first_at_rest, d, dd)
             case "*":
                 a, b = y.arguments
                 first, last = graph.product(b, dd[0], d[1]), graph.product(a, dd[1], d[0])

@@ -6,7 +6,8 @@ mode, relations, and, or, not, isnan, isfinite. abs, min, max and squares have b
 From C come the leaf integer, the condition ==, and two operations that differ in derivatives only:
 value_of(x) rests, and moving_as(x, y) moves as y; and the functions ceil, floor, trunc, round.
 Of tables: entry, of an array by one or two segments, and locate, the segment of a number. Of
-arrays: element, one of the arguments behind the first one, which is its place from 0 on.
+arrays: element, one of the arguments behind the first one, which is its place from 0 on. Of
+equations that need each other: algebraic.py.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from functools import partial, reduce
 
 from ..expressions.expression import RANDOM, RELATIONS, Node, in_order
 from ..expressions.parser import parse
+from . import algebraic
+from .algebraic import GIVEN, UNKNOWN, Linear, System
 from .tables import FAR, LookupTable
 
 ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
@@ -27,8 +30,10 @@ LEAVES = (
     *("parameter", "input", "state", "discrete", "time", "mode", "integer"),
     "later",  # time, of what has switched by the time at an instant
     *("first", "second"),
+    "anchor",  # where a solution is searched
+    *(UNKNOWN, GIVEN),
 )
-MOVING = ("input", "state", "time", "later")
+MOVING = ("input", "state", "time", "later", UNKNOWN, GIVEN)
 RUNTIME = ("first", "second")  # derivatives that may be 0 in one call and not in another
 CONDITIONS = ("mode", "and", "or", "not", "isnan", "isfinite", "==", *RELATIONS)
 OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
@@ -56,8 +61,9 @@ DERIVATIVES = {
     "pow": ["z * (y / x)", "y * log(x)"],
 }
 # of finite arguments, some results are not finite
-FALLIBLE = ("/", "sqrt", "log", "asin", "acos", "pow", "exp", "sinh", "cosh")
-UNDEFINED = ("/", "sqrt", "log", "asin", "acos", "pow")  # some are not a number
+FALLIBLE = ("/", "sqrt", "log", "asin", "acos", "pow", "exp", "sinh", "cosh", "solution", "linear")
+# some are not a number
+UNDEFINED = ("/", "sqrt", "log", "asin", "acos", "pow", "solution", "linear")
 GROWING = ("exp", "sinh", "cosh")  # results overflow
 # slopes may be infinite or undefined
 STEEP = ("sqrt", "log", "asin", "acos", "pow", "atan2", "hypot")
@@ -135,6 +141,8 @@ class Graph:
     # at instants
     looked_up: dict[Value, tuple[LookupTable, list[Value]]] = field(default_factory=dict)
     of_inputs: dict[Value, bool] = field(default_factory=dict)  # of distances
+    systems: dict[str, System] = field(default_factory=dict)  # by name
+    linear: list[Linear] = field(default_factory=list)  # systems of the file
     has_switches: bool = True  # else relations are evaluated with the values
     has_times: bool = False  # without switches: relations of the time with constants are some
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C
@@ -149,16 +157,26 @@ class Graph:
     def is_of_inputs(self, value: Value) -> bool:
         """Return whether inputs move a value and nothing else, also by way of relations."""
         if value not in self.of_inputs:
-            found = True
-            for op, name in value.leaves:
-                if name in self.relations:
-                    found = found and self.is_of_inputs(self.relations[name].distance)
-                elif name in self.segments:
-                    found = found and self.is_of_inputs(self.segments[name].argument)
-                else:
-                    found = found and op not in ("state", "time", "later")
-            self.of_inputs[value] = found
+            found = {op for op, _ in self._reached(value)}
+            self.of_inputs[value] = not found & {"state", "time", "later"}
         return self.of_inputs[value]
+
+    def _reached(self, value: Value) -> set[tuple[str, str]]:
+        """All leaves that a value follows from, also by way of relations."""
+        found = {*value.leaves}
+        todo = [*found]
+        for _, name in todo:
+            if name in self.relations:
+                more = self.relations[name].distance.leaves
+            else:
+                more = self.segments[name].argument.leaves if name in self.segments else ()
+            todo += [leaf for leaf in more if leaf not in found]
+            found.update(more)
+        return found
+
+    def is_circular(self, relation: Relation) -> bool:
+        """Return whether the distance follows from the mode."""
+        return (relation.mode.op, relation.name) in self._reached(relation.distance)
 
     def value(self, op: str, *arguments: Value, name: str = "", number: float = 0.0) -> Value:
         """The operation as it is."""
@@ -387,6 +405,29 @@ class Graph:
             now[v] = later[v] if has_passed else self._with(v, now)
         return now[root]
 
+    def put(self, by: Mapping[Value, Value], first: int) -> None:
+        """Let relations from the `first` on, and what else is known, follow from other values."""
+        for name, relation in [*self.relations.items()][first:]:
+            distance, limit = algebraic.replaced(
+                self, [relation.distance, relation.limit or relation.distance], by
+            )
+            limit = limit if relation.limit else None
+            self.relations[name] = replace(relation, distance=distance, limit=limit)
+        own = {(unknown.op, unknown.name) for unknown in by}
+        for name, segment in self.segments.items():
+            if segment.argument.leaves & own:
+                (argument,) = algebraic.replaced(self, [segment.argument], by)
+                low, high = (self.relations[end.name] for end in (segment.low, segment.high))
+                self.segments[name] = replace(segment, argument=argument, low=low, high=high)
+        for condition, unknown in self.unknowns.items():
+            if unknown is not None and unknown.leaves & own:
+                (self.unknowns[condition],) = algebraic.replaced(self, [unknown], by)
+
+    def given(self, value: Value, number: int) -> Value:
+        """A leaf that stands for a value in equations of a system."""
+        op = "mode" if value.op in CONDITIONS else GIVEN
+        return self.value(op, name=f"{GIVEN} {number}")
+
     def _with(self, value: Value, found: Mapping[Value, Value]) -> Value:
         """The same operation on what has been found for its arguments."""
         arguments = [found[argument] for argument in value.arguments]
@@ -528,6 +569,8 @@ class Graph:
                 return self.negative(d[0])
             case "moving_as":
                 return d[1]
+            case "component" | "factors" | "linear" | "solution":
+                return algebraic.chain(self, y, d)
             case "element":
                 rests = all(is_number(slope, 0.0) for slope in d[1:])
                 return d[1] if rests else self.value("element", a, *d[1:])
@@ -628,6 +671,8 @@ def read_in_series(value: Value) -> tuple[Value, ...]:
     """Those of which the series of a value reads coefficients of the same order."""
     if not value.moves or value.op in CONDITIONS:
         return ()
+    if value.op == "solution":
+        return tuple(v for v in value.arguments if v.op not in CONDITIONS)
     if value.op == "if":
         return value.arguments[2:] if is_unknown(value) else value.arguments[1:]
     return value.arguments[1:] if value.op == "moving_as" else value.arguments
@@ -645,4 +690,7 @@ def with_partials(graph: Graph, roots: Iterable[Value]) -> list[Value]:
             for value in new if value.moves and value.op in DERIVATIVES
             for x, partial in zip(value.arguments, graph.partials(value), strict=True) if x.moves
         ]  # fmt: skip
+        for value in new:
+            if value.moves and value.op in algebraic.VECTORS:
+                todo += algebraic.equations(graph, value)[0]
     return list(done)

@@ -12,7 +12,7 @@ from ..expressions.expression import Node
 from ..expressions.hints import meant
 from ..graph.graph import Graph
 from ..names import OwnFields
-from .content import Expression, ModelFile, ModelFileError, placed, shown
+from .content import CALCULATED, Expression, ModelFile, ModelFileError, placed, shown
 from .file import INSTANCE, located, read_tables, solver_names
 from .include import source_of
 from .model_file import leaves
@@ -43,7 +43,7 @@ def _calculate(file: ModelFile) -> None:
     """Give variables values that follow from what their entries say."""
     file.graph, file.fields = Graph(), OwnFields()
     known = leaves(file, file.graph)
-    for variable in file.of("states", "where", "outputs"):
+    for variable in file.of("states", *CALCULATED):
         place = (variable.place, variable.name, "follows")
         for name in variable.follows:
             if name not in known:

@@ -21,6 +21,7 @@ from .code import CodeFile
 
 FOLLOWS = "calculated"  # section of parameters that follow from others
 # of parameters, inputs and discrete variables that are no real numbers
+ALGEBRAIC = "algebraic"  # unknowns of equations
 OPTIONS, SWITCHES, COUNTS = "options", "switches", "counts"
 WRITTEN = {  # where files have them
     FOLLOWS: "parameters",
@@ -28,6 +29,7 @@ WRITTEN = {  # where files have them
     SWITCHES: "inputs",
     COUNTS: "discrete",
 }
+CALCULATED = (ALGEBRAIC, "where", "outputs")  # sections of what follows from all others
 BOOLEAN, INTEGER = "Boolean", "Integer"
 FIXED, DISCRETE = "fixed", "discrete"  # variabilities: of parameters, and of what follows
 MOST_NUMBERS = 16  # that a whole number may be, for conditions to be resolved
@@ -35,8 +37,8 @@ MOST_OPERATIONS = 1_000_000  # of all expressions
 LONGEST_SHOWN = 60  # characters of a value in a message
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
-    r"^(?:equations?|algebraic|residuals?|dae)$": (
-        "equations in implicit form are not supported: solve them for the derivative of each state"
+    r"^(?:equations?|residuals?|dae)$": (
+        "equations in implicit form are entries of [algebraic], each with an equation"
     ),
     r"\b(?:sample[rds]?|pre|previous|hold|clock|interval)\s*(?:\(|$)": (
         "samplers are written as [sampled.NAME] with every and set, which see the values before"
@@ -97,9 +99,9 @@ class Variable:
     shown: bool = True  # the FMU has it as a variable
     field: str = ""  # where the C of the file has it, if not by its name
     expression: Expression | None = None  # derivative of a state, value of others
+    guess: Expression | None = None  # of an unknown: where its search begins
     initial: Expression | None = None  # start value that follows from parameters and inputs
     leaf: Any = None  # what a generator makes of a parameter, input, state or discrete variable
-    arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
     @property
     def value(self) -> Any:
@@ -124,6 +126,17 @@ class Variable:
     def is_real(self) -> bool:
         """Whether it is neither a condition nor a whole number nor an enumeration."""
         return self.kind == NUMBER
+
+
+@dataclass(eq=False)
+class Block:
+    """Entries that need each other: names of what they calculate."""
+
+    names: list[str]  # all, in the order of the file
+    unknowns: list[str]
+    explicit: list[str]  # the others, in the order of what they name
+    equations: list[str]  # entries that give the residuals, one for each unknown
+    is_linear: bool = False  # in its unknowns
 
 
 @dataclass
@@ -218,6 +231,8 @@ class ModelFile:
     events: list[Event] = field(default_factory=list)
     checks: list[tuple[str, Expression]] = field(default_factory=list)  # messages and conditions
     terminals: dict[str, Terminal] = field(default_factory=dict)
+    blocks: dict[Expression, Block] = field(default_factory=dict)  # by each of their expressions
+    anchors: dict[str, Variable] = field(default_factory=dict)  # unknowns without a start
     is_by_hand: bool = False  # it has no equations: by_hand.py
     indicators: list[str] = field(default_factory=list)  # of C by hand
     time_events: bool = False  # of C by hand
@@ -292,7 +307,7 @@ class ModelFile:
     @property
     def calculated(self) -> list[Variable]:
         """Variables that follow from others at any time."""
-        return self.of(FOLLOWS, "where", "outputs")
+        return self.of(FOLLOWS, *CALCULATED)
 
     @property
     def calculated_reals(self) -> list[Variable]:
@@ -317,7 +332,9 @@ class ModelFile:
     @property
     def assigned(self) -> list[Expression]:
         """All expressions that may read everything."""
-        found = [variable.expression for variable in self.of("where", "states", "outputs")]
+        unknowns, *others = CALCULATED
+        found = [v.expression for v in self.of(unknowns, others[0], "states", *others[1:])]
+        found += [v.guess for v in self.of(*CALCULATED) if v.guess is not None]
         return found + [expression for change in self.changes for expression in change.expressions]
 
     @property

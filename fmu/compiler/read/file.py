@@ -23,6 +23,7 @@ from .arrays import FOR, elements, every, target
 from .code import read as read_code
 from .content import (
     BOOLEAN,
+    CALCULATED,
     COUNTS,
     DISCRETE,
     FIXED,
@@ -172,7 +173,7 @@ def _check_places(file: ModelFile) -> None:
                 raise ModelFileError(f"field: {shown(place)} is not of the type of {first.name}")
     if file.hook is None:
         return
-    reals = {v.name for v in file.of("where", "outputs") if v.is_real}
+    reals = {v.name for v in file.of(*CALCULATED) if v.is_real}
     read = [name for names in file.hook.reads.values() for name in names]
     for key, names, known in (
         ("indicators", file.hook.indicators, reals),
@@ -312,7 +313,8 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
             entry = {"value": entry}
         given = keys.entries(entry, *_keys(section, entry, file))
         section = _section(section, given)
-        texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
+        kinds = ("derivative", "value", "equation")
+        texts = {key: given.pop(key) for key in kinds if key in given}
         _set_start(section, given, texts)
         variable = Variable(element.name, section, **given)
         wanted = DISCRETE if section in keys.CALCULATED else FIXED
@@ -323,11 +325,19 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
         _check_range(variable)
         if file.is_by_hand and texts:
             raise ModelFileError(f"start: expected a number, got {shown(texts['start'])}")
+        if section in CALCULATED and variable.start is not None:
+            number = Node("number", 1, value=variable.start)
+            options = (NUMBER, element.name)
+            variable.guess = Expression((*place, "start"), f"{variable.start:g}", number, *options)
+            variable.start = None
     for key, text in texts.items():
         whole = (*place, key) if isinstance(element.entry, dict) else place
         options = (variable.kind, element.name, key == "derivative")
+        options = (NUMBER, "") if key == "equation" else options
         expression = file.expression(element, whole, text, *options)
-        if key == "start":
+        if key == "start" and section in CALCULATED:
+            variable.guess = expression
+        elif key == "start":
             variable.initial = expression
             expression.event = "then"  # inputs jump at the start
         else:
@@ -382,7 +392,7 @@ def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> No
     if isinstance(kind, tuple):
         wanted = f"one of {', '.join(map(shown, kind))}"
     if isinstance(start, str):
-        if section not in ("states", "discrete", COUNTS):
+        if section not in ("states", "discrete", COUNTS, *CALCULATED):
             raise ModelFileError(f"start: expected {wanted}, got {shown(start)}")
         texts["start"] = given.pop("start")
     elif start is None and section in ("inputs", "states", "discrete", SWITCHES, COUNTS):

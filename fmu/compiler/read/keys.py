@@ -12,6 +12,7 @@ from ..expressions.kinds import CONDITION, WHOLE, Kind
 from ..expressions.parser import FURTHER, NO_NAMES
 from ..units import ANGLE, BASE
 from .content import (
+    ALGEBRAIC,
     BOOLEAN,
     COUNTS,
     FOLLOWS,
@@ -38,7 +39,7 @@ RESERVED = {*FUNCTIONS, *NO_NAMES, "pi", "time", "GUID", "NAME", "TOKEN_FMI3"}
 TAKEN = {*RESERVED, *FURTHER, "sum", "der"}  # no names of functions
 NUMBERS = ("start", "min", "max", "nominal")
 CALCULATED = ("where", "outputs")
-OF_VALUES = ("value", "unit", "description", "variability", "derivative_of", "field")
+OF_VALUES = ("value", "unit", "description", "start", "variability", "derivative_of", "field")
 OF_COUNTS = ("type", "value", "min", "max", "description", "field")
 OF_ALL = ("start", "unit", "min", "max", "description", "field")
 SECTIONS = {  # keys of their entries, and the one that each needs
@@ -46,6 +47,7 @@ SECTIONS = {  # keys of their entries, and the one that each needs
     "inputs": ((*OF_ALL, "type"), ""),
     "states": ((*OF_ALL, "nominal", "derivative", "derivative_of", "causality"), "derivative"),
     "discrete": (("start", "unit", "description", "type", "shown", "field"), ""),
+    ALGEBRAIC: (("equation", *OF_ALL[:-1], "nominal"), "equation"),
     "where": ((*OF_VALUES, "type", "shown"), "value"),  # or expressions
     "outputs": ((*OF_VALUES, "type"), "value"),
 }

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Collection, Mapping
-from graphlib import CycleError, TopologicalSorter
 
 from ..expressions import dimensions
 from ..expressions.dimensions import Dimension, dimension_of, of_exponents, times
@@ -18,13 +17,17 @@ from ..expressions.hints import meant
 from ..expressions.indexes import with_elements
 from ..expressions.kinds import CONDITION, kind_of, with_kinds
 from ..units import BASE
+from .blocks import block, groups
 from .content import (
+    ALGEBRAIC,
     FOLLOWS,
     OPTIONS,
     SWITCHES,
+    Block,
     Expression,
     ModelFile,
     ModelFileError,
+    Variable,
     placed,
     shown,
 )
@@ -69,7 +72,7 @@ def _check_names(file: ModelFile) -> None:
     for index in file.indexes & known.keys():
         raise ModelFileError(f"{file.place_of(index)}: {index}: this name is an index of for, too")
     inputs = dict.fromkeys(variable.name for variable in file.of("inputs", SWITCHES))
-    where = dict.fromkeys(variable.name for variable in file.of("where"))
+    where = dict.fromkeys(variable.name for variable in file.of(ALGEBRAIC, "where"))
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
         (file.constant, parameters, "{} is no parameter"),
@@ -133,22 +136,32 @@ def _in_order(file: ModelFile) -> list[Expression]:
     """Order all expressions: [where] and [outputs] first, each after those that it names."""
     entries = {variable.name: variable for variable in file.calculated}
     entries |= {derivative_of(state.name): state for state in file.of("states")}
-    for variable in entries.values():
-        used = names(variable.expression.tree) & entries.keys()
-        variable.arguments = tuple(entries[name] for name in sorted(used))
-    try:
-        TopologicalSorter({v: v.arguments for v in entries.values()}).prepare()
-    except CycleError as error:
-        loop = error.args[1][::-1]
-        way = shown(" -> ".join(variable.name for variable in loop))
-        raise ModelFileError(
-            f"{loop[0].place}: {loop[0].name}: algebraic loop {way}: "
-            "solve these equations for one of them first"
-        ) from None
-    variables = in_order(entries.values())
+    found, matched = groups(entries)
+    variables: list[Expression] = []
+    for group in found:
+        members = [entries[name] for name in group.names]
+        if group.is_block:
+            found_block = block(group, entries, matched)
+            _add_block(file, members, found_block)
+            members = [entries[n] for n in (*found_block.explicit, *found_block.unknowns)]
+        elif members[0].guess is not None:
+            with placed(members[0].place, members[0].name, "start"):
+                raise ModelFileError("is for what is solved together with others: leave it out")
+        variables += [v.guess for v in members if v.guess is not None]
+        variables += [v.expression for v in members]
     happening = [expression for change in file.changes for expression in change.expressions]
     constant = [e for e in [*file.constant, *file.initial] if e.target not in entries]
-    return [*(v.expression for v in variables), *happening, *constant, *file.checked]
+    return [*variables, *happening, *constant, *file.checked]
+
+
+def _add_block(file: ModelFile, members: list[Variable], found: Block) -> None:
+    """Note a block; ModelFileError if events or the initialization need to know its unknowns."""
+    for variable in members:
+        if variable.section == FOLLOWS:
+            with placed(variable.place, variable.name):
+                way = shown(" -> ".join([*found.names, found.names[0]]))
+                raise ModelFileError(f"algebraic loop {way}: write them in [where]")
+        file.blocks[variable.expression] = found
 
 
 def _check_periods(file: ModelFile) -> None:
@@ -198,6 +211,8 @@ def _check_units(file: ModelFile) -> None:
     for state in file.of("states"):
         units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
     for expression in file.order:
+        if expression in file.blocks:
+            _add_units(file, file.blocks[expression], units)
         with placed(*expression.place):
             expected = units.get(expression.target)
             if expression.is_rate:
@@ -215,6 +230,16 @@ def _check_units(file: ModelFile) -> None:
             continue
         with placed("[where]", variable.name):
             variable.exponents = _whole(units[variable.name])
+
+
+def _add_units(file: ModelFile, block: Block, units: dict[str, Dimension | None]) -> None:
+    """Find units of entries that need each other: each is the unit of what it is added to."""
+    without = [name for name in block.names if name not in units]
+    units |= dict.fromkeys(without)
+    for name in without:
+        expression = file.variables[name].expression
+        with placed(*expression.place):
+            units[name] = dimension_of(expression.tree, units)
 
 
 def _whole(unit: Dimension) -> dict[str, int]:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from ..expressions.expression import RELATIONS, Node, derivative_of, written
 from ..expressions.kinds import CONDITION
+from ..graph import algebraic
+from ..graph.algebraic import UNKNOWN
 from ..graph.graph import MOVING, Graph, Value
 from ..names import Fields, StructFields
 from ..plain_c.memory import is_real
@@ -14,10 +16,13 @@ from ..plain_c.text import CTextError
 from . import file as file_reader
 from .code import Calls
 from .content import (
+    ALGEBRAIC,
+    CALCULATED,
     COUNTS,
     FOLLOWS,
     OPTIONS,
     SWITCHES,
+    Block,
     Expression,
     ModelFile,
     ModelFileError,
@@ -60,9 +65,16 @@ def read(path: Path) -> ModelFile:
         graph.functions = calls.of(file.code.functions) | _written(file, calls, dict(known))
     counted, checked = {v.name for v in file.calculated if not v.is_real}, {*file.checked}
     sources: list[Expression] = []  # of each relation
+    solved: set[Block] = set()
     # right sides last: their conditions are switches of others
     for expression in sorted(file.order, key=lambda expression: expression.event == "then"):
-        tree = expression.tree
+        tree, block = expression.tree, file.blocks.get(expression)
+        if block is not None:
+            if block not in solved:
+                solved.add(block)
+                with file_reader.located(path, file.text):
+                    Blocks(file, known, sources).solve(block)
+            continue
         with file_reader.located(path, file.text), placed(*expression.place):
             if expression.event == "when" and tree.op in RELATIONS:
                 sides = [graph.of_tree(side, known) for side in tree.arguments]
@@ -80,7 +92,7 @@ def read(path: Path) -> ModelFile:
             known[derivative_of(expression.target)] = expression.value
         elif expression.target:
             known.setdefault(expression.target, expression.value)
-    for variable in file.of("where", "outputs"):
+    for variable in file.of(*CALCULATED):
         if variable.variability and variable.value.moves:
             moving = sorted(name or op for op, name in variable.value.leaves if op in MOVING)
             with file_reader.located(path, file.text), placed(variable.place, variable.name):
@@ -100,6 +112,75 @@ def read(path: Path) -> ModelFile:
         for name, node, place in zip(graph.relations, graph.nodes, places, strict=True)
     ]
     return file
+
+
+class Blocks:
+    """Puts solutions into `known`, in the place of unknowns; sources: of each relation."""
+
+    def __init__(self, file: ModelFile, known: dict[str, Value], sources: list[Expression]) -> None:
+        self.file, self.graph, self.known, self.sources = file, file.graph, known, sources
+        self.entries = {variable.name: variable for variable in file.calculated}
+        self.entries |= {derivative_of(state.name): state for state in file.of("states")}
+
+    def solve(self, block: Block) -> None:
+        """Give the entries of a block their values."""
+        graph, first = self.graph, len(self.graph.relations)
+        unknowns = [graph.value(UNKNOWN, name=name) for name in block.unknowns]
+        inside = self.known | dict(zip(block.unknowns, unknowns, strict=True))
+        for name in block.explicit:
+            inside[name] = self._value(name, inside)
+        residuals = []
+        for name in block.equations:
+            value = self._value(name, inside)
+            if self.entries[name].section != ALGEBRAIC:
+                value = graph.value("-", value, inside[name])
+            residuals.append(value)
+        with placed(self.entries[block.names[0]].place, ", ".join(block.names)):
+            found, block.is_linear = algebraic.solved(
+                graph,
+                block.unknowns,
+                [self._text(name) for name in block.equations],
+                unknowns,
+                residuals,
+                lambda: [self._guess(name) for name in block.unknowns],
+                self._ranges(block.unknowns),
+            )
+        by = dict(zip(unknowns, found, strict=True))
+        graph.put(by, first)
+        for name in block.explicit:
+            (self.entries[name].expression.value,) = algebraic.replaced(graph, [inside[name]], by)
+        for name, value in zip(block.unknowns, found, strict=True):
+            self.entries[name].expression.value = value
+        self.known |= {name: self.entries[name].expression.value for name in block.names}
+
+    def _value(self, name: str, inside: Mapping[str, Value]) -> Value:
+        """What the expression of an entry calculates from the unknowns."""
+        expression = self.entries[name].expression
+        with placed(*expression.place):
+            value = self.graph.of_tree(expression.tree, inside)
+        self.sources += [expression] * (len(self.graph.relations) - len(self.sources))
+        return value
+
+    def _guess(self, name: str) -> Value:
+        """Where the search begins: the start of the unknown, or its value at the last restart."""
+        guess = self.entries[name].guess
+        if guess is None:
+            self.file.anchors[name] = self.entries[name]
+            return self.graph.value("anchor", name=name)
+        return guess.value
+
+    def _text(self, name: str) -> str:
+        expression = self.entries[name].expression
+        return f"{'0' if self.entries[name].section == ALGEBRAIC else name} = {expression.text}"
+
+    def _ranges(self, names: list[str]) -> tuple[list[float], list[float], list[float]]:
+        """Nominal values, lower and upper bounds of unknowns."""
+        found = [self.entries[name] for name in names]
+        return (
+            [v.nominal or 1.0 for v in found],
+            [-math.inf if v.min is None else v.min for v in found],
+            [math.inf if v.max is None else v.max for v in found],
+        )
 
 
 def leaves(file: ModelFile, graph: Graph) -> dict[str, Value]:

@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 
 from ..expressions.expression import in_order
+from ..graph.algebraic import SEVERAL
 from ..graph.graph import CONDITIONS, Value
 from ..plain_c.values import Conditions
 from .guards import Path, Plan, stripped, with_guards
@@ -234,6 +235,7 @@ class Blocks:
         results = [other.arguments[branch] for other in later]
         users = self._inside(results, depth) - scope.wanted
         read = {*results, *(argument for user in users for argument in user.arguments)}
+        read -= {v for v in read if v.op in SEVERAL}
         return {v for v in read & scope.wanted if self.paths[v] == scope.path and v.arguments}
 
     def _needed(self, group: list[Value], path: Path) -> list[Value]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 from ..expressions.expression import in_order
+from ..graph import algebraic
 from ..graph.graph import CONDITIONS, LEAVES, Value
 from ..plain_c.values import RELATION, Conditions
 from .blocks import Blocks, Writer
+from .c_text import indented
 from .loops import printed
-from .statements import Block, Constant, Item, Operand, Place, store
+from .statements import Block, Constant, Item, Operand, Place, Statement, store
 
 WITHOUT_DERIVATIVES = ("value_of", "moving_as")  # elsewhere they are their first argument
 FUNCTIONS = {"hypot": "slopes_hypot", "noise": "random_normal", "uniform": "random_uniform"}
@@ -30,10 +33,15 @@ class Leaves(dict[tuple[str, str], Operand]):
     ) -> None:
         super().__init__(places)
         self.names, self.arrays, self.conditions = names, arrays, conditions
+        self.is_near = False  # solutions are searched near their anchors only
+        self.count = itertools.count(1)  # of the arrays of systems in a function
 
-    def but(self, own: Mapping[tuple[str, str], Operand]) -> Leaves:
+    def but(self, own: Mapping[tuple[str, str], Operand], is_near: bool | None = None) -> Leaves:
         """Return these leaves, of which some are elsewhere."""
-        return Leaves({**self, **own}, self.names, self.arrays, self.conditions)
+        found = Leaves({**self, **own}, self.names, self.arrays, self.conditions)
+        found.is_near = self.is_near if is_near is None else is_near
+        found.count = self.count
+        return found
 
 
 class Code(Writer):
@@ -82,10 +90,81 @@ class Code(Writer):
             case "element":
                 place, *row = given
                 return self.constant(element(row, place), name=name)
+            case "component":
+                return self.constant(Place(f"{given[0]}[", int(value.name), "]"), name=name)
+            case "factors":
+                return self._factors(value, given)
+            case "linear":
+                return self.linear(given)
+            case "solution":
+                return self._solution(value, given)
             case "locate":
                 return self.constant(located(self, value.name, given[0]), "int", name)
         c_type = "int" if value.op in CONDITIONS else "double"
         return self.constant(called(value.op, *given), c_type, name)
+
+    def _factors(self, value: Value, given: Sequence[Operand]) -> str:
+        """Return the name of an array with a factorized matrix."""
+        number, places = next(self.leaves.count), algebraic.places(value)
+        count = 1 + max(i for i, _ in places)
+        factors = f"factors_{number}"
+        self.statements += [
+            Statement((f"double {factors}[{count * (count + 1)}] = {{0.0}};",)),
+            Statement((f"int pivot_{number}[{count}];",)),
+        ]
+        for (i, j), of in zip(places, given, strict=True):
+            self.statements.append(store(Place(f"{factors}[", i * count + j, "]"), of))
+        self.statements.append(
+            Statement((f"algebraic_factorize({count}, {factors}, pivot_{number});",))
+        )
+        return factors
+
+    def linear(self, given: Sequence[Operand]) -> str:
+        """Return the name of an array with the solution of linear equations."""
+        factors, *right = given
+        name, pivot = f"linear_{next(self.leaves.count)}", factors.replace("factors", "pivot")
+        self.statements += [
+            Statement((f"double {name}[{len(right)}];",)),
+            Statement(
+                (
+                    f"algebraic_substitute({len(right)}, {factors}, {pivot}, ",
+                    *in_row(right),
+                    f", {name});",
+                )
+            ),
+        ]
+        return name
+
+    def bounds(self, factors: str, errors: Sequence[Operand]) -> str:
+        """Return the name of an array with errors of the solution, from those of right sides."""
+        count, name = len(errors), f"bound_{next(self.leaves.count)}"
+        pivot = factors.replace("factors", "pivot")
+        parts = (
+            f"algebraic_bounds({count}, {factors}, {pivot}, ",
+            *in_row(errors),
+            f", (double[{2 * count}]){{0.0}}, {name});",
+        )
+        self.statements += [Statement((f"double {name}[{count}];",)), Statement(parts)]
+        return name
+
+    def _solution(self, value: Value, given: Sequence[Operand]) -> str:
+        """Return the name of an array with the unknowns of a system."""
+        name = f"solution_{next(self.leaves.count)}"
+        count = len(self.leaves.conditions.graph.systems[value.name].unknowns)
+        read, guesses = given[:-count], given[-count:]
+        has_anchors = any(a.op == "anchor" for a in value.arguments)
+        is_near = "true" if has_anchors and self.leaves.is_near else "false"
+        self.statements += [
+            Statement((f"double {name}[] = ", *in_row(guesses, ""), ";")),
+            Statement(
+                (
+                    f"solve_{value.name}(",
+                    *in_row(read),
+                    f", {is_near}, {name});",
+                )
+            ),
+        ]
+        return name
 
     def _is_int(self, value: Value) -> bool:
         """Return whether C has an integer leaf as an int."""
@@ -126,6 +205,32 @@ class Code(Writer):
     def lines(self) -> list[str]:
         """Return the text of the statements."""
         return printed(self.statements)[0]
+
+
+def of_both(
+    code: Code,
+    first: Mapping[Place, Value],
+    second: Mapping[Place, Value],
+    array: str,
+    end: str,
+) -> list[list[str]]:
+    """Return statements for the first places, and those behind them, unless an array is NULL."""
+    firsts = code.assign(first).statements
+    if code.has_blocks:
+        alone = [f"if ({array} == NULL) {{", *indented([*code.lines(), end]), "}"]
+        both = Code(code.leaves, names=code.names).assign({**first, **second})
+        return [alone, both.lines()]
+    code.statements = []
+    lines = printed(firsts, code.assign(second).statements)
+    return [[*lines[0], f"if ({array} == NULL) {{", f"    {end}", "}"], lines[1]]
+
+
+def in_row(given: Sequence[Operand], of: str = "(const double[])") -> list[Operand]:
+    """The parts of an array of C; it has one element at least."""
+    parts: list[Operand] = [f"{of}{{"]
+    for i, operand in enumerate(given or [0.0]):
+        parts += [", "] * (i > 0) + [operand]
+    return [*parts, "}"]
 
 
 def called(op: str, *given: Operand) -> Operand:

@@ -16,7 +16,7 @@ from ..expressions.kinds import CONDITION, WHOLE, Kind
 from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
 from ..plain_c.values import Conditions
-from ..read.content import COUNTS, SWITCHES, Change, ModelFile, Sampler
+from ..read.content import CALCULATED, COUNTS, SWITCHES, Change, ModelFile, Sampler
 from .c_code import Code, Leaves, located
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
@@ -54,6 +54,8 @@ def leaves(file: ModelFile) -> Leaves:
             found["integer", name] = field_of("values", field, name, "int")
         else:
             found["integer", name] = field_of("(double)values", field, name)
+    for i, name in enumerate(file.anchors):
+        found["anchor", name] = Place("values->anchors[", i, "]")
     for i, name in enumerate(file.graph.segments):
         found["integer", name] = Place("values->segments[", i, "]")
     for i, name in enumerate(file.graph.relations):
@@ -68,7 +70,8 @@ def arrays(file: ModelFile) -> Leaves:
             (op, v.name): Place(f"{op}[", i, "]", v.name, is_opaque=True)
             for op, section in (("state", "states"), ("input", "inputs"))
             for i, v in enumerate(file.of(section))
-        }
+        },
+        is_near=True,
     )
 
 
@@ -126,7 +129,7 @@ def ticks(file: ModelFile) -> list[Tick]:
 def _uncoupled(file: ModelFile) -> set[str]:
     """Counters from which nothing follows but themselves."""
     graph, expressions = file.graph, [c for change in file.changes for c in change.conditions]
-    read = [v.value for v in file.of("states", "where", "outputs")]
+    read = [v.value for v in file.of("states", *CALCULATED)]
     read += [e.value for e in expressions] + [r.distance for r in graph.relations.values()]
     read += [segment.argument for segment in graph.segments.values()]
     used = {name for value in read for _, name in value.leaves}
@@ -160,7 +163,7 @@ class Events:
         states = enumerate(file.of("states"))
         self.tolerances = {("state", x.name): Place("tolerance[", i, "]") for i, x in states}
         graph, self.relations = file.graph, list(file.graph.relations.values())
-        read = [(v.value, None) for v in file.of("states", "where", "outputs") if v.shown]
+        read = [(v.value, None) for v in file.of("states", *CALCULATED) if v.shown]
         for event in file.events:
             during = event.during and event.during.value
             read += [(event.when.value, during), *([(during, None)] if during else [])]
@@ -245,6 +248,7 @@ class Events:
             state_offset=f"offsetof(struct equations_values, {file.fields.value(states[0].name)})"
             if states
             else "0",
+            circles=self._circles(),
             has_inputs=int(any(self.graph.is_of_inputs(r.distance) for r in self.relations)),
             modes=2
             + len(self.relations)
@@ -295,6 +299,18 @@ class Events:
                 [text(file.relation_texts[places[r.name]][:100]) for r in self.located] or ["NULL"]
             ),
         ).splitlines()
+
+    def _circles(self) -> list[str]:
+        """Members of struct relations about relations that follow from themselves."""
+        are_circular = [*map(self.graph.is_circular, self.relations)]
+        if not any(are_circular):
+            return []
+        names = (text(name[:100]) for name in self.file.relation_texts)
+        truths = (str(is_circular).lower() for is_circular in are_circular)
+        return [
+            f".is_circular = (const bool[]){{{', '.join(truths)}}},",
+            f".names = (const char *const[]){{{', '.join(names)}}},",
+        ]
 
     def _rest(self) -> dict[str, list[str]]:
         """When all states rest: where the conditions hold that make each rate 0.
@@ -506,7 +522,8 @@ def _guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards
         modes.setdefault(relation.distance, []).append(relation.mode)
     for segment in graph.segments.values():
         modes.setdefault(segment.argument, []).append(segment.leaf)
-    for value, guard in roots:
+    circular = [relation for relation in graph.relations.values() if graph.is_circular(relation)]
+    for value, guard in [*roots, *((relation.distance, None) for relation in circular)]:
         _widen(graph, found, value, guard)
     for value in reversed(in_order([*modes, *found])):  # each before what it reads
         for mode in modes.get(value, []):

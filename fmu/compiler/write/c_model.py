@@ -9,13 +9,12 @@ from ..graph.band import band
 from ..graph.curve import Curve
 from ..graph.graph import FALLIBLE, Value, is_number
 from ..names import Field
-from ..read.content import OPTIONS, ModelFile
-from . import c_hook
-from .c_code import Code
+from ..read.content import CALCULATED, OPTIONS, ModelFile
+from . import c_algebraic, c_hook
+from .c_code import Code, of_both
 from .c_events import Events, arrays, count, leaves, ticks
 from .c_series import Series
 from .c_text import declared, filled, indented, number, shortened, text
-from .loops import printed
 from .statements import Block, Operand, Place, Statement, field_of, store
 
 BY_AVX2 = """
@@ -50,6 +49,7 @@ def header(file: ModelFile) -> str:
         if title == "parameters":
             fields += declared("int", _options(file))
     counts = declared("int", [file.fields.count(v.name) for v in file.calculated_counts])
+    fields += c_algebraic.fields(file)
     fields += events.doubles() + (["/* calculated, no real numbers */"] if counts else []) + counts
     return filled("equations.h.in", fields=fields + events.ints())
 
@@ -61,7 +61,7 @@ def source(file: ModelFile) -> str:
     has_kinks = _has_kinks(followed) and not file.hook
     followed = ({}, []) if has_kinks else followed
     is_limited = file.hook is not None and file.hook.reach
-    series = Series(file.graph, *followed, leaves(file), is_limited)
+    series = Series(file.graph, *followed, leaves(file).but({}, is_near=True), is_limited)
     has_domains = bool(events.located) and _may_end(file)
     smooth = _smooth(file)
     parts = {
@@ -72,6 +72,7 @@ def source(file: ModelFile) -> str:
         **_domains(file, events, series, has_domains, smooth["jacobian_size"]),
         "events": events.functions("_in_domain" * has_domains),
         "checks": _checks(file),
+        **c_algebraic.parts(file, _modes_of(file, events)),
         **c_hook.parts(file, _ranges(file)),
     }
     return filled(
@@ -231,7 +232,7 @@ def _series(file: ModelFile, series: Series, has_domains: bool) -> dict[str, obj
     if file.hook:
         of_name = dict(zip(file.hook.series, rows, strict=True))
         rows = [of_name.get(name, "0") for name in file.hook.indicators]
-    inner = series.inner()
+    inner, solutions = series.inner(), series.solutions()
     return {
         **series.parts(),
         "row_count": series.row_count + has_domains,
@@ -244,13 +245,19 @@ def _series(file: ModelFile, series: Series, has_domains: bool) -> dict[str, obj
         "may_vanish": str(series.may_vanish).lower(),
         "is_of_time": str(series.is_of_time).lower(),
         "inner_count": len(inner),
+        "solutions_of_series": [
+            f".solutions = (const size_t[]){{{', '.join(map(str, solutions))}}},",
+            f".solution_count = {len(solutions)},",
+        ]
+        if solutions
+        else [],
         "inner_stride": len(series.columns) or 1,
     }
 
 
 def _may_end(file: ModelFile) -> bool:
     """Return whether there are values beyond an event that are not finite."""
-    roots = [v.value for v in file.of("states", "where", "outputs") if v.shown]
+    roots = [v.value for v in file.of("states", *CALCULATED) if v.shown]
     roots += [relation.distance for relation in file.graph.located]
     return any(v.op in FALLIBLE and v.arguments[-(v.op == "/")].moves for v in in_order(roots))
 
@@ -323,7 +330,9 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
         field = file.fields.count(v.name)
         of = count(outputs, v.kind, v.value)
         outputs.statements.append(store(field_of("to", field, field), of))
-    first, second = _of_both(Code(leaves(file), names=names), **targets)
+    first, second = of_both(
+        Code(leaves(file), names=names), *targets.values(), "second", "return STATUS_OK;"
+    )
     is_long = len(first) + len(second) >= LONG
     return {
         "storage_of_derivatives": "SELDOM_CALLED static" if is_long else "static",
@@ -333,21 +342,6 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
         "derivatives": first,
         "second_derivatives": second,
     }
-
-
-def _of_both(
-    code: Code, first: Mapping[Place, Value], second: Mapping[Place, Value]
-) -> list[list[str]]:
-    """Return statements for first derivatives, and those behind them for the second ones."""
-    end = ["if (second == NULL) {", "    return STATUS_OK;", "}"]
-    firsts = code.assign(first).statements
-    if code.has_blocks:
-        alone = ["if (second == NULL) {", *indented([*code.lines(), "return STATUS_OK;"]), "}"]
-        both = Code(code.leaves, names=code.names).assign({**first, **second})
-        return [alone, both.lines()]
-    code.statements = []
-    lines = printed(firsts, code.assign(second).statements)
-    return [[*lines[0], *end], lines[1]]
 
 
 def _at_start(file: ModelFile, structure: str, derivatives: Mapping[Field, Value]) -> list[str]:

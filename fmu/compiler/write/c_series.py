@@ -13,6 +13,7 @@ from functools import partial, reduce
 from itertools import groupby
 
 from ..expressions.expression import in_order
+from ..graph import algebraic
 from ..graph.graph import (
     CONDITIONS,
     DERIVATIVES,
@@ -70,7 +71,10 @@ class Series:
         values = [value for value in with_partials(graph, roots) if value.moves]
         self.sums = Sums(self._row)
         factors = {factor for value in values for factor in self._read(value)}
-        needed = [v for v in values if (v in factors or v in roots) and v not in rates]
+        needed = [
+            v for v in values
+            if (v in factors or v in roots or v.op == "component") and v not in rates
+        ]  # fmt: skip
         self.order = {value: i for i, value in enumerate([*rates, *needed])}  # in products
         self.rows = self.order
         self.columns: dict[Value, int] = {}
@@ -93,6 +97,7 @@ class Series:
         self.has_over_k = False  # whether coefficients need 1 / k
         self._coefficients: dict[Value, Operand] = {}
         self._late: list[Item] = []  # statements for the values of one form
+        self._is_trial = False  # results of systems are 0 for now
         self._path: Path = ()  # of the value whose coefficient is written
         self.opened = Opened(plan)
         if plan.choices:
@@ -113,7 +118,7 @@ class Series:
 
     def _in_branches(self, roots: list[Value]) -> tuple[list[Value], Plan, list[Value]]:
         """Return roots, the plan of those that move, and inputs whose products are in a branch."""
-        if not self.is_wide:
+        if not (self.is_wide or _has_systems(roots)):
             used = inputs_in_products(roots)
             guarded = where_used(self.graph, used, roots) if used else roots
             became = with_guards(guarded, self.leaves.conditions, self._cost)
@@ -191,6 +196,13 @@ class Series:
     def inner(self) -> list[str]:
         """What may be nothing at the begin of a step and large within, and its argument."""
         return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in self._inner()]
+
+    def solutions(self) -> list[int]:
+        """Rows of unknowns that Newton's method finds."""
+        return [
+            i for value, i in self.rows.items()
+            if value.op == "component" and value.arguments[0].op == "solution"
+        ]  # fmt: skip
 
     def _inner(self) -> list[tuple[Value, Value]]:
         if self.is_limited:
@@ -365,13 +377,38 @@ class Series:
             found = "if", ("==", "k", "1"), "origin->time_scale", 0.0
         elif value.op in DERIVATIVES:
             found = self._of_function(value)
+        elif value.op in algebraic.VECTORS:
+            return self._of_system(value)
+        elif value.op == "component":
+            found = self._at(value.arguments[0])[int(value.name)]
+        elif value.op == "factors":
+            return 0.0
         else:
             found = self._of_operation(value)
+        if self._is_trial:
+            return without_zeros(found)
         targets = self.places(value, "k")
         if not targets:
             return self.later.constant(found) if isinstance(found, tuple) else found
         self.later.statements += [store(target, found) for target in targets]
         return targets[0]
+
+    def _of_system(self, vector: Value) -> list[Operand]:
+        """Return the coefficients of a system's results.
+
+        They make up for the residuals that the equations have with 0 in their place.
+        """
+        equations, factors = algebraic.equations(self.graph, vector)
+        results = algebraic.components(self.graph, vector, len(equations))
+        before, self._is_trial = self._coefficients, True
+        self._coefficients = {**before, **dict.fromkeys(results, 0.0)}
+        right = [negated(self._at(equation)) for equation in equations]
+        self._coefficients, self._is_trial = before, False
+        if len(right) == 1:
+            (slope,) = factors.arguments
+            return [self.later.constant(("*", *right, self._known(self._over(slope))))]
+        name = self.later.linear([self._known(factors), *right])
+        return [Place(f"{name}[", i, "]") for i in range(len(right))]
 
     def _of_function(self, value: Value) -> Operand:
         pairs, terms = self._pairs(value), []
@@ -448,13 +485,37 @@ class Series:
 def is_wide(roots: list[Value], conditions: Conditions) -> bool:
     """Return whether so many values move that elements stand side by side."""
     moving = [value for value in in_order(roots) if value.moves]
-    if len(moving) < WIDE:
+    if len(moving) < WIDE or _has_systems(roots):
         return False
     found = forms(moving)
     if len(moving) >= ALIKE * len({found[value] for value in moving}):
         return True
     became = with_guards(roots, conditions)
     return not Plan.of([became[root] for root in roots]).choices
+
+
+def without_zeros(term: Operand) -> Operand:
+    """The operand without terms and factors that are 0."""
+    if not isinstance(term, tuple) or term[0] not in ("+", "-", "*", "negative"):
+        return term
+    op, *given = [term[0], *map(without_zeros, term[1:])]
+    a, b = given[0], given[-1]
+    if 0.0 not in (a, b):
+        return (op, *given)
+    if op in ("*", "negative") or a == b:
+        return 0.0
+    return a if b == 0.0 else negated(b) if op == "-" else b
+
+
+def negated(term: Operand) -> Operand:
+    """The operand with the opposite sign."""
+    if isinstance(term, tuple) and term[0] == "negative":
+        return term[1]
+    return 0.0 if term == 0.0 else ("negative", term)
+
+
+def _has_systems(roots: Iterable[Value]) -> bool:
+    return any(value.op in algebraic.VECTORS for value in in_order(roots))
 
 
 def inputs_in_products(roots: Iterable[Value]) -> list[Value]:

@@ -13,7 +13,17 @@ from ..graph.graph import MOVING, Relation, Value
 from ..interface import Declaration, Display
 from ..names import Field
 from ..read import by_hand
-from ..read.content import COUNTS, FOLLOWS, OPTIONS, SWITCHES, ModelFile, Variable, placed
+from ..read.content import (
+    ALGEBRAIC,
+    CALCULATED,
+    COUNTS,
+    FOLLOWS,
+    OPTIONS,
+    SWITCHES,
+    ModelFile,
+    Variable,
+    placed,
+)
 from ..read.keys import NUMBERS
 from ..units import ANGLE, BASE, STANDARD, parsed, shown
 from . import c_events, c_hook, c_model, lock
@@ -31,6 +41,7 @@ CAUSALITIES = {
     "inputs": "input",
     "states": "output",
     "discrete": "output",
+    ALGEBRAIC: "local",
     "where": "local",
     "outputs": "output",
 }
@@ -185,7 +196,7 @@ def _with_usual(entries: dict[str, Any]) -> dict[str, Any]:
 
 def flat(file: ModelFile) -> list[str]:
     """Return functions without slope of what moves or is set, with the variables that call them."""
-    called = [(v.name, v.expression) for v in file.of("states", "where", "outputs") if v.is_real]
+    called = [(v.name, v.expression) for v in file.of("states", *CALCULATED) if v.is_real]
     hidden = {variable.name for variable in file.variables.values() if not variable.shown}
     changes = [pair for change in file.changes for pair in change.given.items()]
     called += [(name, expression) for name, expression in changes if name not in hidden]
@@ -254,7 +265,7 @@ def _entries_of(
     if not variable.is_real:
         return _entries_of_count(variable, file)
     entries = _local(file.fields.value(variable.name)) | {"causality": causality}
-    if variable.section in ("where", "outputs") and variable.variability:
+    if variable.section in CALCULATED and variable.variability:
         entries["variability"] = variable.variability
     if causality == "parameter":
         is_fixed = ("parameter", variable.name) in _fixed(file)

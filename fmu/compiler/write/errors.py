@@ -9,6 +9,7 @@ from functools import reduce
 from itertools import product
 
 from ..expressions.expression import in_order
+from ..graph import algebraic
 from ..graph.graph import CONDITIONS, Graph, Value
 from ..graph.tables import LookupTable
 from .c_code import Code, called
@@ -50,6 +51,12 @@ class Errors:
         match "table" if value in self.graph.looked_up else value.op:
             case "negative":
                 return errors[0]
+            case "component":
+                return Place(f"{errors[0]}[", int(value.name), "]")
+            case "linear" | "solution":
+                return self._of_system(value, errors)
+            case "factors":
+                return NONE
             case "if":
                 same = errors[1] == errors[2]
                 return errors[1] if same else ("if", arguments[0], *errors[1:])
@@ -83,6 +90,36 @@ class Errors:
                 parts = [reduce(_sum, spreads)]
         parts = [part for part in parts if part != NONE]
         return reduce(_sum, [*parts, ("*", ROUNDING, ("fabs", y))])
+
+    def _of_system(self, vector: Value, errors: Sequence[Operand]) -> str:
+        """Return the name of an array with the errors of a system's results.
+
+        Its equations have the errors of what they read, and of the rounding of their terms.
+        """
+        graph, code = self.graph, self.code
+        if vector.op == "linear":
+            factors = vector.arguments[0]
+            results = algebraic.components(graph, vector, len(errors) - 1)
+            of_read = [[error] if error != NONE else [] for error in errors[1:]]
+            of_elements = [self.of(element) for element in factors.arguments]
+        else:
+            found = algebraic.placed(graph, vector)
+            factors = found.factors
+            results = algebraic.components(graph, vector, len(found.residuals))
+            of_read = [
+                [("*", ("fabs", code.of(slope)), errors[k]) for k, slope in row.items()
+                 if errors[k] != NONE]
+                for row in found.by_given
+            ]  # fmt: skip
+            of_elements = [NONE] * len(factors.arguments)
+        sums = [reduce(_sum, terms, NONE) for terms in of_read]
+        for (i, j), element, error in zip(
+            algebraic.places(factors), factors.arguments, of_elements, strict=True
+        ):
+            size = ("*", ("*", 4.0, ROUNDING), ("fabs", code.of(element)))
+            own = ("*", _sum(size, error), ("fabs", code.of(results[j])))
+            sums[i] = _sum(sums[i], own)
+        return code.bounds(code.of(factors), sums)
 
     def _in_table(self, table: LookupTable, corner: Sequence[Operand]) -> Operand:
         """Return the value of a table for operands."""

@@ -14,11 +14,12 @@ from functools import reduce
 from operator import and_, or_
 
 from ..expressions.expression import in_order
+from ..graph.algebraic import SEVERAL
 from ..graph.graph import CONDITIONS, Value, is_unknown
 from ..plain_c.values import Conditions, Known
 
 COSTS = {"+": 1, "-": 1, "*": 1, "negative": 0, "/": 5, "value_of": 0, "moving_as": 0, "if": 0}
-COSTS |= {"entry": 1, "element": 2}
+COSTS |= {"entry": 1, "element": 2, "component": 60} | dict.fromkeys(SEVERAL, 0)
 OF_FUNCTION = 20
 MOST_CHOSEN = 4  # cost of both branches of ?:
 WORTH_A_BRANCH = 8  # cost of what is not calculated then

@@ -53,6 +53,7 @@ nominal change_names assignment zeros events errors series inner band order plac
 domains row_of_indicator indicator_names
 """
 OF_MODELS = frozenset(WORDS.split())
+SYSTEMS = re.compile(r"(solution|factors|pivot|linear|bound)_\d+")  # arrays of c_code.py
 
 
 class Names:
@@ -86,7 +87,7 @@ class Names:
         if base.isupper() and sum(map(str.isalpha, base)) > 2:  # maybe a macro
             plain += "_"
         found = plain or f"{base}1"
-        while found in self.taken:
+        while found in self.taken or SYSTEMS.fullmatch(found):
             self.counts[plain] += 1
             found = f"{plain}_{self.counts[plain]}" if plain else f"{base}{self.counts[plain]}"
         self.taken.add(found)

@@ -1,0 +1,378 @@
+#include "algebraic.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum {
+    MOST_ITERATIONS = 60,
+    MOST_NEAR = 10,     /* iterations to a solution that is near */
+    MOST_HALVINGS = 30, /* of a step */
+    PATIENCE = 12,      /* iterations after which a small step is enough */
+    MOST_SHOWN = 120,   /* characters of names or equations in a message */
+};
+
+static const double noise = 4.0 * DBL_EPSILON; // of a residual, over the sizes of its terms
+static const double small_step = 1e-8;         // over the sizes of the unknowns
+/* Of the first step, within which there is one solution: Deuflhard, theorem 2.1. */
+static const double contraction = 0.25;
+
+/* ---- Linear equations ----------------------------------------------------------------------- */
+
+static void swap_rows(int count, double matrix[], int a, int b) {
+    for (int j = 0; a != b && j < count; j++) {
+        const double kept = matrix[a * count + j];
+        matrix[a * count + j] = matrix[b * count + j];
+        matrix[b * count + j] = kept;
+    }
+}
+
+/* Writes 1 over the largest element of each row; INFINITY if it is 0. */
+static void write_scales(int count, const double matrix[], double scale[]) {
+    for (int i = 0; i < count; i++) {
+        double largest = 0.0;
+        for (int j = 0; j < count; j++) {
+            largest = fmax(largest, fabs(matrix[i * count + j]));
+        }
+        scale[i] = 1.0 / largest;
+    }
+}
+
+/* Returns the row from k on that has the largest element in column k, over its scale. */
+static int pivot_row(int count, const double matrix[], const double scale[], int k) {
+    int found = k;
+    double largest = fabs(matrix[k * count + k]) * scale[k];
+    for (int i = k + 1; i < count; i++) {
+        const double size = fabs(matrix[i * count + k]) * scale[i];
+        if (size > largest) {
+            largest = size;
+            found = i;
+        }
+    }
+    return found;
+}
+
+static bool factorize(int count, double matrix[], int pivot[]) {
+    double *scale = matrix + count * count;
+    write_scales(count, matrix, scale);
+    for (int k = 0; k < count; k++) {
+        const int row = pivot_row(count, matrix, scale, k);
+        pivot[k] = row;
+        swap_rows(count, matrix, k, row);
+        scale[row] = scale[k];
+        const double *upper = matrix + k * count;
+        if (upper[k] == 0.0 || !isfinite(upper[k])) {
+            return false;
+        }
+        for (int i = k + 1; i < count; i++) {
+            double *own = matrix + i * count;
+            if (own[k] == 0.0) {
+                continue;
+            }
+            const double factor = own[k] / upper[k];
+            own[k] = factor;
+            for (int j = k + 1; j < count; j++) {
+                own[j] -= factor * upper[j];
+            }
+        }
+    }
+    return true;
+}
+
+void algebraic_factorize(int count, double matrix[], int pivot[]) {
+    if (!factorize(count, matrix, pivot)) {
+        for (int k = 0; k < count; k++) {
+            pivot[k] = k;
+            matrix[k * count + k] = (double)NAN;
+        }
+    }
+}
+
+void algebraic_substitute(int count, const double matrix[], const int pivot[], const double b[],
+                          double x[]) {
+    memcpy(x, b, (size_t)count * sizeof *x);
+    for (int k = 0; k < count; k++) {
+        const double kept = x[pivot[k]];
+        x[pivot[k]] = x[k];
+        x[k] = kept;
+    }
+    for (int i = 1; i < count; i++) {
+        for (int j = 0; j < i; j++) {
+            x[i] -= matrix[i * count + j] * x[j];
+        }
+    }
+    for (int i = count - 1; i >= 0; i--) {
+        for (int j = i + 1; j < count; j++) {
+            x[i] -= matrix[i * count + j] * x[j];
+        }
+        x[i] /= matrix[i * count + i];
+    }
+}
+
+void algebraic_bounds(int count, const double matrix[], const int pivot[], const double e[],
+                      double room[], double bound[]) {
+    double *unit = room;
+    double *column = room + count;
+    memset(bound, 0, (size_t)count * sizeof *bound);
+    for (int j = 0; j < count; j++) {
+        memset(unit, 0, (size_t)count * sizeof *unit);
+        unit[j] = 1.0;
+        algebraic_substitute(count, matrix, pivot, unit, column);
+        for (int i = 0; i < count; i++) {
+            bound[i] += fabs(column[i]) * e[j];
+        }
+    }
+}
+
+/* ---- Newton's method ------------------------------------------------------------------------ */
+
+/* What one solution needs; the vectors are of the unknowns or residuals. */
+struct newton {
+    const struct algebraic *system;
+    const double *given;
+    double *matrix, *residual, *step, *ahead, *trial, *size;
+    int *pivot;
+};
+
+static bool are_finite(int count, const double x[]) {
+    bool found = true;
+    for (int i = 0; i < count; i++) {
+        found &= isfinite(x[i]) != 0;
+    }
+    return found;
+}
+
+/* True if each residual is as small as the rounding of its terms. */
+static bool is_rounding(const struct newton *newton, const double unknown[]) {
+    const int count = newton->system->count;
+    bool found = true;
+    for (int i = 0; found && i < count; i++) {
+        double size = 0.0;
+        for (int j = 0; j < count; j++) {
+            size += fabs(newton->matrix[i * count + j] * unknown[j]);
+        }
+        found = fabs(newton->residual[i]) <= noise * size;
+    }
+    return found;
+}
+
+/* Returns the largest change of an unknown, over its size. */
+static double length(const struct newton *newton, const double step[]) {
+    double found = 0.0;
+    for (int i = 0; i < newton->system->count; i++) {
+        found = fmax(found, fabs(step[i]) / newton->size[i]);
+    }
+    return found;
+}
+
+/* Writes the correction that makes up for the residuals, by the last factorized matrix. */
+static void correct(const struct newton *newton, double step[]) {
+    algebraic_substitute(newton->system->count, newton->matrix, newton->pivot, newton->residual,
+                         step);
+    for (int i = 0; i < newton->system->count; i++) {
+        step[i] = -step[i];
+    }
+}
+
+/* Writes unknown + part step, within the bounds. */
+static void move(const struct newton *newton, const double unknown[], double part) {
+    const struct algebraic *system = newton->system;
+    for (int i = 0; i < system->count; i++) {
+        const double moved = unknown[i] + part * newton->step[i];
+        newton->trial[i] = moved < system->low[i]    ? system->low[i]
+                           : moved > system->high[i] ? system->high[i]
+                                                     : moved;
+    }
+}
+
+/* Moves by a part of the step to `trial`. Returns how much of the step is left there, by the matrix
+ * at its begin: 1 - part of linear equations. */
+static double left_after(const struct newton *newton, const double unknown[], double part,
+                         double of_step) {
+    move(newton, unknown, part);
+    newton->system->evaluate(newton->given, newton->trial, newton->residual, NULL);
+    if (!are_finite(newton->system->count, newton->residual)) {
+        return INFINITY;
+    }
+    correct(newton, newton->ahead);
+    return length(newton, newton->ahead) / of_step;
+}
+
+/* True if the whole step leads to the one solution that is near; moves there. */
+static bool advance_near(const struct newton *newton, const double unknown[], double of_step) {
+    if (of_step <= small_step) {
+        move(newton, unknown, 1.0);
+        return true;
+    }
+    const double half = left_after(newton, unknown, 0.5, of_step); // far away, chance may hit
+    return fabs(half - 0.5) <= contraction &&
+           left_after(newton, unknown, 1.0, of_step) <= contraction;
+}
+
+/* Finds how much of the step leads nearer to a solution, and moves there. */
+static bool advance_far(const struct newton *newton, const double unknown[], double of_step) {
+    double part = 1.0;
+    for (int count = 0; count <= MOST_HALVINGS; count++) {
+        const double left = left_after(newton, unknown, part, of_step);
+        if (left <= 1.0 - 0.25 * part || (of_step <= small_step && isfinite(left))) {
+            return true;
+        }
+        part *= 0.5;
+    }
+    return false;
+}
+
+/* Solves a single equation between its bounds, at which the residual has opposite signs. Returns
+ * false if it has not. */
+static bool bisect(const struct newton *newton, double unknown[]) {
+    const struct algebraic *system = newton->system;
+    double low = system->low[0];
+    double high = system->high[0];
+    if (system->count != 1 || !isfinite(low) || !isfinite(high)) {
+        return false;
+    }
+    double at_low;
+    double at_high;
+    system->evaluate(newton->given, &low, &at_low, NULL);
+    system->evaluate(newton->given, &high, &at_high, NULL);
+    if (!((at_low <= 0.0 && at_high >= 0.0) || (at_low >= 0.0 && at_high <= 0.0))) {
+        return false;
+    }
+    for (double middle = 0.5 * low + 0.5 * high; middle > low && middle < high;
+         middle = 0.5 * low + 0.5 * high) {
+        double value;
+        system->evaluate(newton->given, &middle, &value, NULL);
+        if (isnan(value)) {
+            return false;
+        }
+        const bool is_below = (value < 0.0) == (at_low < 0.0) && value != 0.0;
+        *(is_below ? &low : &high) = middle;
+    }
+    double of_low;
+    system->evaluate(newton->given, &low, &of_low, NULL);
+    system->evaluate(newton->given, &high, &at_high, NULL);
+    unknown[0] = fabs(of_low) < fabs(at_high) ? low : high;
+    system->evaluate(newton->given, unknown, newton->residual, NULL);
+    return true;
+}
+
+static enum algebraic_outcome iterate(const struct newton *newton, bool is_near, double unknown[],
+                                      int *iterations) {
+    const struct algebraic *system = newton->system;
+    const size_t size = (size_t)system->count * sizeof(double);
+    double *before = newton->size + system->count; // the last iterate
+    double last = INFINITY;                        // length of the step to it
+    for (*iterations = 0;; ++*iterations) {
+        memset(newton->matrix, 0, (size_t)system->count * size);
+        system->evaluate(newton->given, unknown, newton->residual, newton->matrix);
+        if (!are_finite(system->count, newton->residual)) {
+            return ALGEBRAIC_NOT_FINITE;
+        }
+        if (is_rounding(newton, unknown)) {
+            return ALGEBRAIC_SOLVED;
+        }
+        if (!factorize(system->count, newton->matrix, newton->pivot)) {
+            return ALGEBRAIC_SINGULAR;
+        }
+        correct(newton, newton->step);
+        bool is_rest = true; // the step is rounding
+        for (int i = 0; i < system->count; i++) {
+            newton->size[i] = fmax(fabs(unknown[i]), system->nominal[i]);
+            is_rest &= fabs(newton->step[i]) <= DBL_EPSILON * fabs(unknown[i]);
+        }
+        if (is_rest) {
+            return ALGEBRAIC_SOLVED;
+        }
+        const double of_step = length(newton, newton->step);
+        if (*iterations > 0 && last <= small_step * 1e-4 && of_step > 0.5 * last) {
+            memcpy(unknown, before, size); // from here on there is only noise
+            return ALGEBRAIC_SOLVED;
+        }
+        if (*iterations >= PATIENCE && of_step <= small_step) {
+            return ALGEBRAIC_SOLVED;
+        }
+        memcpy(before, unknown, size);
+        last = of_step;
+        if (*iterations == (is_near ? MOST_NEAR : MOST_ITERATIONS) ||
+            !(is_near ? advance_near(newton, unknown, of_step)
+                      : advance_far(newton, unknown, of_step))) {
+            return ALGEBRAIC_FAR;
+        }
+        memcpy(unknown, newton->trial, size);
+    }
+}
+
+struct algebraic_report algebraic_solve(const struct algebraic *system, struct algebraic_room room,
+                                        const double given[], bool is_near, double unknown[]) {
+    const int count = system->count;
+    const struct newton newton = {
+        .system = system,
+        .given = given,
+        .matrix = room.matrix,
+        .residual = room.vector,
+        .step = room.vector + count,
+        .ahead = room.vector + 2 * count,
+        .trial = room.vector + 3 * count,
+        .size = room.vector + 4 * count,
+        .pivot = room.pivot,
+    };
+    struct algebraic_report report = {.iterations = 0};
+    report.outcome = iterate(&newton, is_near, unknown, &report.iterations);
+    if (report.outcome != ALGEBRAIC_SOLVED && bisect(&newton, unknown)) {
+        report.outcome = ALGEBRAIC_SOLVED;
+    }
+    for (int i = 0; i < count; i++) {
+        report.residual = fmax(report.residual, fabs(newton.residual[i]));
+        unknown[i] = report.outcome == ALGEBRAIC_SOLVED ? unknown[i] : (double)NAN;
+    }
+    return report;
+}
+
+/* ---- Messages ------------------------------------------------------------------------------- */
+
+bool algebraic_fails(const struct algebraic *system, struct algebraic_room room,
+                     const double given[], double t, double unknown[], char *text, size_t size) {
+    const struct algebraic_report report = algebraic_solve(system, room, given, false, unknown);
+    const char *more = strlen(system->names) > MOST_SHOWN ? "..." : "";
+    switch (report.outcome) {
+    case ALGEBRAIC_SOLVED:
+        return false;
+    case ALGEBRAIC_NOT_FINITE:
+        (void)snprintf(text, size,
+                       "%.*s%s: no solution at t = %.17g, their equations are not finite after %d "
+                       "iterations: %.*s",
+                       MOST_SHOWN, system->names, more, t, report.iterations, MOST_SHOWN,
+                       system->equations);
+        return true;
+    case ALGEBRAIC_SINGULAR:
+        (void)snprintf(text, size,
+                       "%.*s%s: no solution at t = %.17g, the equations are singular with largest "
+                       "residual %.3g after %d iterations: %.*s",
+                       MOST_SHOWN, system->names, more, t, report.residual, report.iterations,
+                       MOST_SHOWN, system->equations);
+        return true;
+    case ALGEBRAIC_FAR:
+        (void)snprintf(
+            text, size,
+            "%.*s%s: no solution at t = %.17g, largest residual %.3g after %d iterations: "
+            "%.*s",
+            MOST_SHOWN, system->names, more, t, report.residual, report.iterations, MOST_SHOWN,
+            system->equations);
+        return true;
+    }
+    return true;
+}
+
+bool algebraic_lacks(int count, const double x[], const char *names, const char *equations,
+                     double t, char *text, size_t size) {
+    if (are_finite(count, x)) {
+        return false;
+    }
+    (void)snprintf(text, size,
+                   "%.*s%s: no solution at t = %.17g: these linear equations are singular, or what "
+                   "they read is not finite: %.*s",
+                   MOST_SHOWN, names, strlen(names) > MOST_SHOWN ? "..." : "", t, MOST_SHOWN,
+                   equations);
+    return true;
+}

@@ -1,0 +1,282 @@
+"""Equations that need each other: derivatives against mpmath, published problems, failures."""
+
+import random
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import fmpy
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+from scipy.special import ellipj, lambertw
+
+from tests.equations import test_equation_derivatives as plain
+from tests.equations.compiled import Model
+from tests.equations.examples import METHODS, quick
+from tests.equations.test_equation_derivatives import (  # noqa: F401
+    test_jacobian,
+    test_series_fits_the_equations,
+    test_values_and_derivatives_along_a_curve,
+)
+from tests.support.tables import tables
+
+# ---- Derivatives ---------------------------------------------------------------------------------
+
+UNKNOWNS = ("v", "w", "m", "n", "k")
+TIGHT = {"v": "0.4 * sin(v + 0.5 * w) + ({a})", "w": "({b}) - 0.3 * tanh(v * w)"}
+LINEAR = {"m": "0.5 * n + ({a})", "n": "2 - 0.3 * m * sin({b}) + 0.1 * v"}
+SINGLE = {"k": "0.25 * cos(k) * ({a})"}
+
+
+class Solutions:
+    """The unknowns by mpmath, as functions of all that is given."""
+
+    def __init__(self, texts: dict[str, str]) -> None:
+        self.sides = [
+            plain.reference(text, (*plain.NAMES, "time", *UNKNOWNS)) for text in texts.values()
+        ]
+        self.known: dict[tuple, mpmath.matrix] = {}
+
+    def of(self, number: int, *given: mpmath.mpf) -> mpmath.mpf:
+        key = (mpmath.mp.dps, *given)
+        if key not in self.known:
+            at = dict(zip((*plain.NAMES, "time"), given, strict=True))
+
+            def missed(*z: mpmath.mpf) -> list[mpmath.mpf]:
+                named = at | dict(zip(UNKNOWNS, z, strict=True))
+                return [side(**named) - own for side, own in zip(self.sides, z, strict=True)]
+
+            guess = [0.5] * len(UNKNOWNS)
+            self.known[key] = mpmath.findroot(missed, guess, tol=16 * mpmath.eps, maxsteps=50)
+        return self.known[key][number]
+
+
+@pytest.fixture(scope="module", params=range(3))
+def case(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple]:
+    """A model with systems, nonlinear and linear, texts of its equations, and a point."""
+    chance = random.Random(request.param)
+    inner = [plain.expression(chance, 3) for _ in range(5)]
+    texts = {n: t.format(a=inner[0], b=inner[1]) for n, t in TIGHT.items()}
+    texts |= {n: t.format(a=inner[2], b=inner[3]) for n, t in LINEAR.items()}
+    texts |= {n: t.format(a=inner[4]) for n, t in SINGLE.items()}
+
+    def mixed(depth: int) -> str:
+        named = rf"\b({'|'.join(plain.NAMES[1:])})\b"
+        return re.sub(
+            named,
+            lambda m: chance.choice([m[0], *UNKNOWNS]),
+            plain.expression(chance, depth),
+        )
+
+    sides = {name: mixed(3) for name in ("x", "y", *(f"z{i}" for i in range(8)))}
+    outputs = "".join(f'{n} = {{ value = "{t}" }}\n' for n, t in sides.items() if n[0] == "z")
+    tight = "".join(f'{n} = {{ start = 0.5, equation = "{n} - ({texts[n]})" }}\n' for n in TIGHT)
+    where = "".join(f'{n} = {{ value = "{texts[n]}", start = 0.5 }}\n' for n in [*LINEAR, *SINGLE])
+    model = Model(
+        tmp_path_factory.mktemp("model"),
+        'name = "Random"\n[parameters]\np = { start = 1 }\n[inputs]\nu = {}\n[states]\n'
+        f'x = {{ derivative = "{sides["x"]}" }}\ny = {{ derivative = "{sides["y"]}" }}\n'
+        f"[algebraic]\n{tight}[where]\n{where}[outputs]\n{outputs}",
+    )
+    solutions, call = Solutions(texts), f"({', '.join(plain.NAMES)}, time)"
+    functions = {
+        f"solved_{n}": (lambda *a, i=i: solutions.of(i, *a)) for i, n in enumerate(UNKNOWNS)
+    }
+    plain.PYTHON.update(functions)
+    called = {
+        name: re.sub(rf"\b({'|'.join(UNKNOWNS)})\b", rf"solved_\1{call}", text)
+        for name, text in sides.items()
+    }
+    point = {name: chance.uniform(-1.5, 1.5) for name in (*plain.NAMES, "time")}
+    yield model, called, point, chance
+    for name in functions:
+        del plain.PYTHON[name]
+
+
+# ---- Published problems --------------------------------------------------------------------------
+
+PROBLEMS = tables(str(Path(__file__).with_name("algebraic")))
+Solution = dict[str, np.ndarray | float]
+
+
+def robertson(_t: np.ndarray) -> Solution:
+    """By scipy, as ordinary differential equations."""
+
+    def rates(_t: float, y: np.ndarray) -> list[float]:
+        a, b, c = 0.04 * y[0], 1e4 * y[1] * y[2], 3e7 * y[1] ** 2
+        return [b - a, a - b - c, c]
+
+    found = solve_ivp(rates, (0, 400), [1, 0, 0], "Radau", rtol=1e-13, atol=1e-18).y[:, -1]
+    return dict(zip(("y1", "y2", "y3"), found, strict=True))
+
+
+def akzo_nobel(_t: np.ndarray) -> Solution:
+    """Reference of the test set for IVP solvers."""
+    numbers = "0.1150794920661702 0.1203831471567715e-2 0.1611562887407974"
+    numbers += " 0.3656156421249283e-3 0.1708010885264404e-1 0.4873531310307455e-2"
+    return {f"y{i}": float(number) for i, number in enumerate(numbers.split(), 1)}
+
+
+def transistor_amplifier(_t: np.ndarray) -> Solution:
+    """Reference of the test set for IVP solvers."""
+    numbers = "-0.5562145012262709e-2 3.006522471903042 2.849958788608128 2.926422536206241"
+    numbers += " 2.704617865010554 2.761837778393145 4.770927631616772 1.236995868091548"
+    return {f"y{i}": float(number) for i, number in enumerate(numbers.split(), 1)}
+
+
+def diode(t: np.ndarray) -> Solution:
+    saturation, thermal, resistance, u = 1e-9, 0.026, 5, 1.2 * np.sin(t)
+    argument = saturation * resistance / thermal * np.exp((u + saturation * resistance) / thermal)
+    return {"i": thermal / resistance * lambertw(argument).real - saturation}
+
+
+def solar_cell(t: np.ndarray) -> Solution:
+    """The voltage by how long it takes to reach it."""
+    light, dark, thermal, series, parallel = 3.8, 2e-9, 0.0335, 0.02, 15
+    both = series + parallel
+
+    def current(v: float) -> float:
+        most = parallel * (series * (light + dark) + v) / (thermal * both)
+        argument = series * dark * parallel / (thermal * both) * np.exp(most)
+        first = (parallel * (light + dark) - v) / both
+        return first - thermal / series * lambertw(argument).real
+
+    def late(v: float) -> float:
+        return quad(lambda at: 12 / current(at), 0, v, epsabs=1e-14, epsrel=1e-14)[0] - t[-1]
+
+    end = brentq(late, 0.1, 0.64, xtol=1e-15)
+    return {"v": end, "i": current(end)}
+
+
+def four_bars(t: np.ndarray) -> Solution:
+    a, b, c, d = 1, 3, 2.5, 3
+
+    def angles(phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        k1, k2, k3 = d / a, d / c, (a**2 - b**2 + c**2 + d**2) / (2 * a * c)
+        first = np.cos(phi) - k1 - k2 * np.cos(phi) + k3
+        second, third = -2 * np.sin(phi), k1 - (k2 + 1) * np.cos(phi) + k3
+        psi = 2 * np.arctan((-second - np.sqrt(second**2 - 4 * first * third)) / (2 * first))
+        coupler = d + c * np.exp(1j * psi) - a * np.exp(1j * phi)
+        return np.angle(coupler), psi
+
+    theta, psi = angles(0.5 + 1.9 * t)
+
+    def height(at: float) -> float:
+        theta, psi = angles(0.5 + 1.9 * at)
+        return b * np.sin(theta) + c * np.sin(psi)
+
+    whole = quad(height, 0, t[-1], epsabs=1e-13, epsrel=1e-13, limit=200)[0]
+    return {"theta": theta, "psi": psi, "s": whole}
+
+
+def slider_crank(t: np.ndarray) -> Solution:
+    r, length = 0.3, 0.8
+
+    def rate(phi: float) -> float:
+        return 4 + np.sqrt(1 - (r / length * np.sin(phi)) ** 2)
+
+    def late(phi: float) -> float:
+        return quad(lambda at: 1 / rate(at), 0, phi, epsabs=1e-14, epsrel=1e-14)[0] - t[-1]
+
+    phi = brentq(late, 10, 20, xtol=1e-14)
+    x = r * np.cos(phi) + np.sqrt(length**2 - (r * np.sin(phi)) ** 2)
+    return {"phi": phi, "beta": np.arcsin(r / length * np.sin(phi)), "x": x}
+
+
+def kepler(t: np.ndarray) -> Solution:
+    e = 0.6
+    of = [
+        brentq(lambda at, M=M: at - e * np.sin(at) - M, M - 1, M + 1, xtol=1e-15) for M in 0.1 + t
+    ]
+
+    def area(at: float) -> float:
+        return (1 - e * np.cos(at)) ** 3 / 2
+
+    return {"E": np.array(of), "A": quad(area, of[0], of[-1], epsabs=1e-13, epsrel=1e-13)[0]}
+
+
+def pendulum(t: np.ndarray) -> Solution:
+    """By elliptic functions: from the horizontal, k = sin(45 deg)."""
+    g, m = 9.81, 0.5
+    _, cn, dn, _ = ellipj(np.sqrt(g) * t, m)
+    theta = 2 * np.arcsin(np.sqrt(m) * cn / dn)
+    return {"x": np.sin(theta), "y": -np.cos(theta), "T": 3 * g * np.cos(theta)}
+
+
+def ladder(t: np.ndarray) -> Solution:
+    fibonacci = [0, 1]
+    while len(fibonacci) < 42:
+        fibonacci.append(sum(fibonacci[-2:]))
+    u = np.exp(-t * fibonacci[40] / fibonacci[41])
+    of = {f"w[{i}]": u * fibonacci[2 * (20 - i) + 1] / fibonacci[41] for i in (1, 7, 20)}
+    return of | {"u": u}
+
+
+def enzyme(t: np.ndarray) -> Solution:
+    half, most = 4 / 5, 2.5 * 0.2
+    s = half * lambertw(2 / half * np.exp((2 - most * t) / half)).real
+    return {"s": s, "c": 0.2 * s / (half + s)}
+
+
+def van_der_pol(t: np.ndarray) -> Solution:
+    left = 2 - np.log(2) - t
+    y = np.sqrt(-lambertw(-np.exp(-2 * left), -1).real)
+    return {"y": y, "z": y**3 / 3 - y}
+
+
+SOLUTIONS = [
+    robertson, akzo_nobel, transistor_amplifier, diode, solar_cell, four_bars, slider_crank,
+    kepler, pendulum, ladder, enzyme, van_der_pol,
+]  # fmt: skip
+
+
+def made(folder: Path, text: str) -> tuple[Path, Path]:
+    """The unpacked FMUs of both versions of FMI."""
+    path = folder / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    fmu = quick(path, folder)
+    found = fmu, fmu.parent / "fmi3" / fmu.name
+    return tuple(
+        Path(fmpy.extract(str(each), str(folder / f"{i}"))) for i, each in enumerate(found)
+    )
+
+
+def run(
+    unpacked: Path, method: str, tolerance: float, stop: float, step: float, names: list[str]
+) -> np.ndarray:
+    return fmpy.simulate_fmu(
+        str(unpacked),
+        stop_time=stop,
+        output_interval=step,
+        relative_tolerance=tolerance,
+        start_values={"solver_method": METHODS[method]},
+        output=names,
+    )
+
+
+@pytest.mark.parametrize("solution", SOLUTIONS, ids=lambda solution: solution.__name__)
+def test_a_published_problem(solution: Callable[[np.ndarray], Solution], tmp_path: Path) -> None:
+    """In every method that suits; FMI 3.0 has the bits of FMI 2.0."""
+    problem = PROBLEMS[solution.__name__]
+    units, times = made(tmp_path, problem["text"]), (problem["stop"], problem["step"])
+    t = np.linspace(0, problem["stop"], 1 + round(problem["stop"] / problem["step"]))
+    expected = solution(t)
+    for method in problem["methods"]:
+        for tolerance in (1e-8, 1e-12):
+            rows, other = (run(unit, method, tolerance, *times, [*expected]) for unit in units)
+            np.testing.assert_array_equal(rows, other)
+            for name, of in expected.items():
+                found = rows[name][-1:] if np.ndim(of) == 0 else rows[name]
+                error = np.max(np.abs(found - of)) / np.max(np.abs(of))
+                print(solution.__name__, method, tolerance, name, error)
+                assert error <= 10 * tolerance, (
+                    method,
+                    tolerance,
+                    name,
+                    error,
+                )
