@@ -99,6 +99,43 @@ enum status instance_series(double t, double time_scale, int first, int last,
     return instance->model->series->extend(&origin, first, last, rows);
 }
 
+/* ---- Anchors --------------------------------------------------------------------------------
+ * The searches for solutions of equations begin at anchors in the values that the integrator runs
+ * with; these move with it. Behind them are those of the restart, from which a replay begins. */
+
+static size_t anchors_size(const struct model *model) {
+    return model->anchors.size / 2;
+}
+
+void instance_settle(double t, const double x[], void *instance_pointer) {
+    const struct instance *instance = instance_pointer;
+    const struct model *model = instance->model;
+    char *values = instance->memory.restart_values;
+    evaluate_inputs(instance, t);
+    model->anchor(values, instance->state.restart_time.s + t, x, instance->u, true,
+                  doubles_of(values, model->anchors));
+}
+
+void instance_take_anchors(struct instance *instance) {
+    const struct instance_memory *memory = &instance->memory;
+    const struct range anchors = instance->model->anchors;
+    memcpy(memory->values + anchors.offset, memory->restart_values + anchors.offset,
+           anchors_size(instance->model));
+}
+
+/* Notes the present anchors as those of the restart. */
+static void keep_anchors(struct instance *instance) {
+    instance_move_anchors(instance);
+    char *anchors = instance->memory.values + instance->model->anchors.offset;
+    memcpy(anchors + anchors_size(instance->model), anchors, anchors_size(instance->model));
+}
+
+/* Lets the integrator run with the anchors of the restart again. */
+static void restore_anchors(struct instance *instance) {
+    char *anchors = instance->memory.restart_values + instance->model->anchors.offset;
+    memcpy(anchors, anchors + anchors_size(instance->model), anchors_size(instance->model));
+}
+
 /* ---- Continuing ----------------------------------------------------------------------------- */
 
 /* True if there can be state events with the parameters that the integrator runs with. */
@@ -203,7 +240,7 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     if (has_new_parameters) {
         activate(instance, model->parameters);
     }
-    instance_move_anchors(instance);
+    keep_anchors(instance);
     activate(instance, memory->written);
     instance->parameters_are_active = true;
     instance_note_inputs(instance);
@@ -227,6 +264,7 @@ enum status instance_replay_history(struct instance *instance) {
     double reached;
     prepare_inputs(instance, polynomials_move(instance->memory.active_inputs,
                                               count_of(instance->model->inputs)));
+    restore_anchors(instance);
     const struct integrator_start start = start_of(instance);
     enum status status = integrator_restart(
         instance->integrator, doubles_of(instance->memory.restart_values, states), &start);

@@ -43,6 +43,9 @@ NONNULL void instance_note_part(struct instance *instance, enum status status, b
  * restored instance does so at its next step, if that continues from there. */
 MUST_CHECK NONNULL enum status instance_replay_history(struct instance *instance);
 
+/* Lets searches for solutions of equations at the present point begin where the integrator's do. */
+NONNULL void instance_take_anchors(struct instance *instance);
+
 /* Writes the variables that show totals of the integrator. */
 NONNULL void instance_write_statistics(const struct integrator_statistics *statistics,
                                        struct instance_values *own);
@@ -59,3 +62,4 @@ ode_series instance_series;
 ode_indicators instance_indicators;
 ode_rounding instance_rounding;
 ode_reach instance_reach;
+ode_settle instance_settle;

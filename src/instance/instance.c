@@ -184,6 +184,7 @@ static enum status setup(struct instance *instance) {
     instance->ode.jacobian = instance_jacobian;
     instance->ode.band = model->band;
     instance->ode.may_end = model->explain != NULL;
+    instance->ode.settle = model->anchor != NULL ? instance_settle : NULL;
     instance->ode.context = instance;
     if (model->series != NULL) {
         instance->ode.series = instance_series;

@@ -174,8 +174,11 @@ static inline double instance_next_time(const struct instance *instance) {
 
 /* Lets the searches for solutions of equations begin at those of the present values. */
 static inline void instance_move_anchors(struct instance *instance) {
-    if (instance->model->anchor != NULL) {
-        instance->model->anchor(instance->memory.values, instance->state.time.s);
+    const struct model *model = instance->model;
+    if (model->anchor != NULL) {
+        char *values = instance->memory.values;
+        model->anchor(values, instance->state.time.s, doubles_of(values, model->states),
+                      doubles_of(values, model->inputs), false, doubles_of(values, model->anchors));
         instance->outputs_are_valid = false;
     }
 }

@@ -248,6 +248,7 @@ static enum status advance(struct step *step) {
                            left > 1 ? left : 1, &state->latest_time,
                            doubles_of(instance->memory.values, instance->model->states));
     state->statistics = *integrator_totals(instance->integrator);
+    instance_take_anchors(instance);
     step->triggered =
         instance->model->events != NULL ? integrator_event(instance->integrator) : NULL;
     return status;
@@ -287,7 +288,7 @@ static enum status advance_by_restarts(struct step *step) {
             steps_left(step) <= 0) {
             return status;
         }
-        instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
+        instance_note_part(instance, status, false); // moves the instance there
         move_inputs(instance, clock_difference(state->time, step->begin));
         const enum status restarted =
             instance_prepare_history(instance, step->end, CONTINUE_AFTER_EVENT);

@@ -149,6 +149,7 @@ enum status integrator_restart(struct integrator *integrator, const double x[],
     problem->is_after_event = start->is_after_event;
     problem->reached = 0.0;
     problem->failed_at = -INFINITY;
+    problem->steps_since_settled = 0;
     memcpy(integrator->reached_x, x, problem->ode.state_count * sizeof(double));
     enum status status = STATUS_OK;
     if (start->indicators != NULL || location_is_active(&problem->location)) {

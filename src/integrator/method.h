@@ -24,6 +24,7 @@ struct problem {
     bool continues, is_after_event; /* as in struct integrator_start */
     double reached;                 /* end of the last advance; 0 after a restart */
     double failed_at; /* last time at which the right-hand side failed; -INFINITY if it never did */
+    int steps_since_settled;
     int64_t evaluation_count;      /* calls of the right-hand side, or series begun */
     integrator_observer *observer; /* NULL if there is none */
     struct location location;
@@ -60,6 +61,17 @@ static inline enum status problem_rhs(struct problem *problem, double t, const d
         return STATUS_OK;
     }
     return problem_fail(problem, t, x);
+}
+
+/* Internal steps between calls of settle: one costs as much as a right-hand side. */
+enum { PROBLEM_SETTLES = 4 };
+
+/* Tells the ode, now and then, that an internal step has ended at t with the state x. */
+static inline void problem_settle(struct problem *problem, double t, const double x[]) {
+    if (problem->ode.settle != NULL && ++problem->steps_since_settled == PROBLEM_SETTLES) {
+        problem->steps_since_settled = 0;
+        problem->ode.settle(t, x, problem->ode.context);
+    }
 }
 
 /* Distance from the end of a solution that is as good as none, over the time since the restart. */

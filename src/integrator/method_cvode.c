@@ -385,6 +385,9 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
                 break;
             }
         }
+        if (flag >= 0 && internal > before) {
+            problem_settle(problem, internal, x);
+        }
         if (flag >= 0 && problem->observer != NULL && internal < t && internal > watched) {
             watched = internal;
             *is_cut_short = problem_ask_observer(problem, internal, x);

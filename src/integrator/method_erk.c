@@ -130,6 +130,9 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
             memcpy(erk->step_dx, erk->dx, size);
         }
     }
+    if (!erk->is_cut_short) {
+        problem_settle(erk->base.problem, t, small_vector_data(x));
+    }
     if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
         erk->is_cut_short = problem_ask_observer(problem, t, small_vector_data(x));
     }
@@ -160,7 +163,7 @@ static int begin_watching(struct erk *erk, double end, const double begin_x[], d
         }
         erk->step_begin = problem->reached;
     }
-    const bool is_watched = is_searched || problem->observer != NULL;
+    const bool is_watched = is_searched || problem->observer != NULL || problem->ode.settle != NULL;
     return ERKStepSetPostprocessStepFn(erk->solver, is_watched ? observe : NULL);
 }
 

@@ -341,7 +341,8 @@ static double begin_advance(struct taylor *taylor, const double begin_x[], doubl
 static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps, bool is_long,
                               const double begin_x[], double *stopped_at, double x[],
                               struct method_work *work) {
-    const struct problem *problem = taylor->series.problem;
+    struct taylor_series *series = &taylor->series;
+    const struct problem *problem = series->problem;
     const bool is_searched = taylor->is_searched;
     *stopped_at = begin_advance(taylor, begin_x, x);
     work->internal = *stopped_at;
@@ -370,6 +371,7 @@ static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps
             work->is_cut_short = true;
             break;
         }
+        problem_settle(series->problem, end, taylor->end_x);
         if (end > t) {
             taylor->passed = end;
             end = t;

@@ -32,6 +32,9 @@ typedef void ode_rounding(const double state_errors[], double errors[], void *co
  * model_events. */
 typedef void ode_reach(const double x[], double reach[], void *context);
 
+/* Tells that the solution has come to x at the time t: later calls are near to it. */
+typedef void ode_settle(double t, const double x[], void *context);
+
 /* The fields that each step of `taylor` reads stand last, next to the rest of struct problem. */
 struct ode {
     ode_rhs *rhs;
@@ -44,6 +47,7 @@ struct ode {
     const struct series *rows; /* what its rows are; NULL if they are states only */
     ode_series *series;        /* for INTEGRATOR_TAYLOR only; NULL if the model has none */
     size_t series_row_count;   /* >= state_count if there is a series */
+    ode_settle *settle;        /* called after some internal steps; NULL if nothing depends on it */
     bool may_end; /* true if solutions may end: then a method does not creep up to such an end */
     size_t state_count; /* > 0 */
     void *context;

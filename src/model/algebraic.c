@@ -15,6 +15,8 @@ enum {
 
 static const double noise = 4.0 * DBL_EPSILON; // of a residual, over the sizes of its terms
 static const double small_step = 1e-8;         // over the sizes of the unknowns
+static const double last_step = 1e-9;          // over the unknowns themselves
+static const double large_step = 1e-2;         // likewise
 /* Of the first step, within which there is one solution: Deuflhard, theorem 2.1. */
 static const double contraction = 0.25;
 
@@ -54,6 +56,10 @@ static int pivot_row(int count, const double matrix[], const double scale[], int
 }
 
 static bool factorize(int count, double matrix[], int pivot[]) {
+    if (count == 1) {
+        pivot[0] = 0;
+        return matrix[0] != 0.0 && isfinite(matrix[0]);
+    }
     double *scale = matrix + count * count;
     write_scales(count, matrix, scale);
     for (int k = 0; k < count; k++) {
@@ -91,6 +97,10 @@ void algebraic_factorize(int count, double matrix[], int pivot[]) {
 
 void algebraic_substitute(int count, const double matrix[], const int pivot[], const double b[],
                           double x[]) {
+    if (count == 1) {
+        x[0] = b[0] / matrix[0];
+        return;
+    }
     memcpy(x, b, (size_t)count * sizeof *x);
     for (int k = 0; k < count; k++) {
         const double kept = x[pivot[k]];
@@ -131,7 +141,8 @@ void algebraic_bounds(int count, const double matrix[], const int pivot[], const
 struct newton {
     const struct algebraic *system;
     const double *given;
-    double *matrix, *residual, *step, *ahead, *trial, *size;
+    double *matrix, *next; /* slopes at the last iterate, factorized, and at the next one */
+    double *residual, *step, *ahead, *trial, *size, *before;
     int *pivot;
 };
 
@@ -143,6 +154,23 @@ static bool are_finite(int count, const double x[]) {
     return found;
 }
 
+static void copy(int count, const double from[], double to[]) {
+    for (int i = 0; i < count; i++) {
+        to[i] = from[i];
+    }
+}
+
+/* Writes the residuals and their slopes to newton->residual and newton->next. Returns false if the
+ * residuals are not finite. */
+static bool evaluate(const struct newton *newton, const double unknown[]) {
+    const int count = newton->system->count;
+    for (int i = 0; i < count * count; i++) {
+        newton->next[i] = 0.0;
+    }
+    newton->system->evaluate(newton->given, unknown, newton->residual, newton->next);
+    return are_finite(count, newton->residual);
+}
+
 /* True if each residual is as small as the rounding of its terms. */
 static bool is_rounding(const struct newton *newton, const double unknown[]) {
     const int count = newton->system->count;
@@ -150,7 +178,7 @@ static bool is_rounding(const struct newton *newton, const double unknown[]) {
     for (int i = 0; found && i < count; i++) {
         double size = 0.0;
         for (int j = 0; j < count; j++) {
-            size += fabs(newton->matrix[i * count + j] * unknown[j]);
+            size += fabs(newton->next[i * count + j] * unknown[j]);
         }
         found = fabs(newton->residual[i]) <= noise * size;
     }
@@ -168,15 +196,17 @@ static double length(const struct newton *newton, const double step[]) {
 
 /* Writes the correction that makes up for the residuals, by the last factorized matrix. */
 static void correct(const struct newton *newton, double step[]) {
-    algebraic_substitute(newton->system->count, newton->matrix, newton->pivot, newton->residual,
-                         step);
-    for (int i = 0; i < newton->system->count; i++) {
+    const int count = newton->system->count;
+    algebraic_substitute(count, newton->matrix, newton->pivot, newton->residual, step);
+    for (int i = 0; i < count; i++) {
         step[i] = -step[i];
     }
 }
 
-/* Writes unknown + part step, within the bounds. */
-static void move(const struct newton *newton, const double unknown[], double part) {
+/* Moves by a part of the step to `trial`, within the bounds. Returns how much of the step is left
+ * there, by the matrix at its begin: 1 - part of linear equations. */
+static double left_after(const struct newton *newton, const double unknown[], double part,
+                         double of_step) {
     const struct algebraic *system = newton->system;
     for (int i = 0; i < system->count; i++) {
         const double moved = unknown[i] + part * newton->step[i];
@@ -184,38 +214,33 @@ static void move(const struct newton *newton, const double unknown[], double par
                            : moved > system->high[i] ? system->high[i]
                                                      : moved;
     }
-}
-
-/* Moves by a part of the step to `trial`. Returns how much of the step is left there, by the matrix
- * at its begin: 1 - part of linear equations. */
-static double left_after(const struct newton *newton, const double unknown[], double part,
-                         double of_step) {
-    move(newton, unknown, part);
-    newton->system->evaluate(newton->given, newton->trial, newton->residual, NULL);
-    if (!are_finite(newton->system->count, newton->residual)) {
+    if (!evaluate(newton, newton->trial)) {
         return INFINITY;
     }
     correct(newton, newton->ahead);
     return length(newton, newton->ahead) / of_step;
 }
 
-/* True if the whole step leads to the one solution that is near; moves there. */
+/* Moves to a trial by the whole step. Returns false unless it leads to the one solution that is
+ * near. */
 static bool advance_near(const struct newton *newton, const double unknown[], double of_step) {
-    if (of_step <= small_step) {
-        move(newton, unknown, 1.0);
-        return true;
+    if (of_step > large_step) { // chance may lead to a solution that is far away
+        const double half = left_after(newton, unknown, 0.5, of_step);
+        if (!(fabs(half - 0.5) <= contraction)) {
+            return false;
+        }
     }
-    const double half = left_after(newton, unknown, 0.5, of_step); // far away, chance may hit
-    return fabs(half - 0.5) <= contraction &&
-           left_after(newton, unknown, 1.0, of_step) <= contraction;
+    const double left = left_after(newton, unknown, 1.0, of_step);
+    return left <= contraction || (of_step <= small_step && left < INFINITY);
 }
 
-/* Finds how much of the step leads nearer to a solution, and moves there. */
+/* Moves to a trial by as much of the step as leads nearer to a solution. Returns false if none
+ * does. */
 static bool advance_far(const struct newton *newton, const double unknown[], double of_step) {
     double part = 1.0;
     for (int count = 0; count <= MOST_HALVINGS; count++) {
         const double left = left_after(newton, unknown, part, of_step);
-        if (left <= 1.0 - 0.25 * part || (of_step <= small_step && isfinite(left))) {
+        if (left <= 1.0 - 0.25 * part || (of_step <= small_step && left < INFINITY)) {
             return true;
         }
         part *= 0.5;
@@ -257,64 +282,85 @@ static bool bisect(const struct newton *newton, double unknown[]) {
     return true;
 }
 
-static enum algebraic_outcome iterate(const struct newton *newton, bool is_near, double unknown[],
+/* Factorizes the matrix at the last iterate and writes the step from there, and the sizes of the
+ * unknowns. Returns false if it is singular. */
+static bool begin_step(struct newton *newton, const double unknown[]) {
+    double *factorized = newton->next;
+    newton->next = newton->matrix;
+    newton->matrix = factorized;
+    if (!factorize(newton->system->count, factorized, newton->pivot)) {
+        return false;
+    }
+    correct(newton, newton->step);
+    for (int i = 0; i < newton->system->count; i++) {
+        newton->size[i] = fmax(fabs(unknown[i]), newton->system->nominal[i]);
+    }
+    return true;
+}
+
+/* True if the step changes no unknown by more than a part of it. */
+static bool is_within(const struct newton *newton, const double unknown[], double part) {
+    bool found = true;
+    for (int i = 0; i < newton->system->count; i++) {
+        found &= fabs(newton->step[i]) <= part * fabs(unknown[i]);
+    }
+    return found;
+}
+
+static enum algebraic_outcome iterate(struct newton *newton, bool is_near, double unknown[],
                                       int *iterations) {
-    const struct algebraic *system = newton->system;
-    const size_t size = (size_t)system->count * sizeof(double);
-    double *before = newton->size + system->count; // the last iterate
-    double last = INFINITY;                        // length of the step to it
+    const int count = newton->system->count;
+    double last = INFINITY; // length of the step to this iterate
+    if (!evaluate(newton, unknown)) {
+        return ALGEBRAIC_NOT_FINITE;
+    }
     for (*iterations = 0;; ++*iterations) {
-        memset(newton->matrix, 0, (size_t)system->count * size);
-        system->evaluate(newton->given, unknown, newton->residual, newton->matrix);
-        if (!are_finite(system->count, newton->residual)) {
-            return ALGEBRAIC_NOT_FINITE;
-        }
         if (is_rounding(newton, unknown)) {
             return ALGEBRAIC_SOLVED;
         }
-        if (!factorize(system->count, newton->matrix, newton->pivot)) {
+        if (!begin_step(newton, unknown)) {
             return ALGEBRAIC_SINGULAR;
         }
-        correct(newton, newton->step);
-        bool is_rest = true; // the step is rounding
-        for (int i = 0; i < system->count; i++) {
-            newton->size[i] = fmax(fabs(unknown[i]), system->nominal[i]);
-            is_rest &= fabs(newton->step[i]) <= DBL_EPSILON * fabs(unknown[i]);
-        }
-        if (is_rest) {
-            return ALGEBRAIC_SOLVED;
-        }
         const double of_step = length(newton, newton->step);
+        if (is_within(newton, unknown, DBL_EPSILON) ||
+            (*iterations >= PATIENCE && of_step <= small_step)) {
+            return ALGEBRAIC_SOLVED;
+        }
+        if (is_within(newton, unknown, last_step)) { // the digits double
+            for (int i = 0; i < count; i++) {
+                unknown[i] += newton->step[i];
+            }
+            return ALGEBRAIC_SOLVED;
+        }
         if (*iterations > 0 && last <= small_step * 1e-4 && of_step > 0.5 * last) {
-            memcpy(unknown, before, size); // from here on there is only noise
+            copy(count, newton->before, unknown); // from here on there is only noise
             return ALGEBRAIC_SOLVED;
         }
-        if (*iterations >= PATIENCE && of_step <= small_step) {
-            return ALGEBRAIC_SOLVED;
-        }
-        memcpy(before, unknown, size);
+        copy(count, unknown, newton->before);
         last = of_step;
         if (*iterations == (is_near ? MOST_NEAR : MOST_ITERATIONS) ||
             !(is_near ? advance_near(newton, unknown, of_step)
                       : advance_far(newton, unknown, of_step))) {
             return ALGEBRAIC_FAR;
         }
-        memcpy(unknown, newton->trial, size);
+        copy(count, newton->trial, unknown);
     }
 }
 
 struct algebraic_report algebraic_solve(const struct algebraic *system, struct algebraic_room room,
                                         const double given[], bool is_near, double unknown[]) {
     const int count = system->count;
-    const struct newton newton = {
+    struct newton newton = {
         .system = system,
         .given = given,
         .matrix = room.matrix,
+        .next = room.matrix + count * (count + 1),
         .residual = room.vector,
         .step = room.vector + count,
         .ahead = room.vector + 2 * count,
         .trial = room.vector + 3 * count,
         .size = room.vector + 4 * count,
+        .before = room.vector + 5 * count,
         .pivot = room.pivot,
     };
     struct algebraic_report report = {.iterations = 0};

@@ -24,14 +24,14 @@ struct algebraic {
 
 /* Memory for one system of `count` unknowns. */
 struct algebraic_room {
-    double *matrix; /* count (count + 1) */
+    double *matrix; /* 2 count (count + 1) */
     double *vector; /* 6 count */
     int *pivot;     /* count */
 };
 
 #define ALGEBRAIC_ROOM(count)                                                                      \
     (struct algebraic_room) {                                                                      \
-        (double[(count) * ((count) + 1)]){0}, (double[6 * (count)]){0}, (int[count]) {             \
+        (double[2 * (count) * ((count) + 1)]){0}, (double[6 * (count)]){0}, (int[count]) {         \
             0                                                                                      \
         }                                                                                          \
     }

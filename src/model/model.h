@@ -249,13 +249,15 @@ struct model {
     /* NULL if the model has no modes. */
     const struct model_events *events;
 
-    /* Where solutions of equations are searched: double[], unknowns at the last restart. */
+    /* Where solutions of equations are searched: double[], unknowns at an earlier point, and behind
+     * them as many that belong to the instance. */
     struct range anchors;
 
-    /* Writes the anchors: solutions with the values that are set, searched from the old anchors.
-     * The right-hand side and the other pure functions have values only where solutions are near
-     * the anchors. NULL if there are none. */
-    void (*anchor)(void *values, double t);
+    /* Writes to anchors the solutions at t, x and u, searched from the anchors in values; where
+     * there is none, these. is_near: only solutions near these count, as for the right-hand side
+     * and the other pure functions. NULL if there are no anchors. */
+    void (*anchor)(const void *values, double t, const double x[], const double u[], bool is_near,
+                   double anchors[]);
 
     /* Writes one line that says which equations have no solution with the values that are set, to
      * text (size bytes). Returns false if all have one. NULL if none need each other. */

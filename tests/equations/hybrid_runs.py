@@ -48,6 +48,7 @@ class Unit:
         self.guids = {"fmi2": declared.guid, "fmi3": declared.token("fmi3")}
         self.references = {name: v.reference for name, v in declared.variables.items()}
         self.states = [v.name for v in file.of("states")]
+        self.unknowns = [name for block in file.blocks.values() for name in block.unknowns]
         self.indicators = len(file.graph.located)
 
     def instance(self, kind: type) -> Any:

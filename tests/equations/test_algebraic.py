@@ -9,6 +9,7 @@ import fmpy
 import mpmath
 import numpy as np
 import pytest
+from fmpy.fmi2 import FMU2Slave
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipj, lambertw
@@ -16,6 +17,7 @@ from scipy.special import ellipj, lambertw
 from tests.equations import test_equation_derivatives as plain
 from tests.equations.compiled import Model
 from tests.equations.examples import METHODS, quick
+from tests.equations.hybrid_runs import Exchange, Unit
 from tests.equations.test_equation_derivatives import (  # noqa: F401
     test_jacobian,
     test_series_fits_the_equations,
@@ -280,3 +282,104 @@ def test_a_published_problem(solution: Callable[[np.ndarray], Solution], tmp_pat
                     name,
                     error,
                 )
+
+
+# ---- Guesses -------------------------------------------------------------------------------------
+
+# sin(z - x) + sin(x) / 5 = 0: its solutions are 2 pi apart, so that one from far away is another
+BRANCHES = """
+name = "Branches"
+[states]
+x = {{ derivative = "1" }}
+y = {{ derivative = "cos(z) / (1.5 + sin(z / 3))" }}
+[algebraic]
+z = {{ {start}equation = "sin(z - x) + 0.2 * sin(x)" }}
+"""
+
+
+def branch(t: float) -> float:
+    return t - np.arcsin(0.2 * np.sin(t))
+
+
+@pytest.mark.parametrize("start", ["", 'start = "x", '], ids=["anchor", "start"])
+def test_a_solution_stays_on_its_branch(start: str, tmp_path: Path) -> None:
+    """In steps of any length, up to one of 40 s."""
+
+    def rate(t: float) -> float:
+        return np.cos(branch(t)) / (1.5 + np.sin(branch(t) / 3))
+
+    y = quad(rate, 0, 40, limit=500, epsabs=1e-12)[0]
+    unit, _ = made(tmp_path, BRANCHES.format(start=start))
+    for method in METHODS:
+        for step in (0.1, 8.0, 40.0):
+            end = run(unit, method, 1e-9, 40, step, ["y", "z"])[-1]
+            assert abs(end["z"] - branch(40)) < 1e-9, (method, step)
+            assert abs(end["y"] - y) < 1e-7, (method, step)
+
+
+KEPLER = PROBLEMS["kepler"]["text"]
+
+
+@pytest.mark.parametrize(
+    "text", [KEPLER, BRANCHES.format(start=""), PROBLEMS["four_bars"]["text"]],
+    ids=["kepler", "branches", "four_bars"],
+)  # fmt: skip
+def test_snapshots_change_no_bit(text: str, tmp_path: Path) -> None:
+    """Nor do bytes, points at which a step is tried and undone, or outputs in between."""
+    unit = Unit(tmp_path, text)
+    for method in METHODS:
+        fmu = unit.instance(FMU2Slave)
+        fmu.instantiate()
+        fmu.setupExperiment(tolerance=1e-8)
+        fmu.setInteger(unit.of("solver_method"), [METHODS[method]])
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        step, rows, saved = 0.31, [], {}
+        asked = unit.of(*unit.states, *unit.unknowns)
+
+        def advance(first: int, last: int, fmu=fmu, step=step, asked=asked) -> list:
+            found = []
+            for k in range(first, last):
+                fmu.doStep(k * step, step)
+                found.append(fmu.getReal(asked))
+            return found
+
+        for k in range(60):
+            saved[k] = fmu.getFMUState()
+            rows += advance(k, k + 1)
+        for k in (0, 7, 31, 50):
+            state = saved[k]
+            if k % 2:
+                state = fmu.deSerializeFMUstate(fmu.serializeFMUState(state))
+            fmu.setFMUState(state)
+            advance(k, min(60, k + 3))  # undone
+            fmu.setFMUState(state)
+            assert advance(k, k + 10) == rows[k : k + 10], (method, k)
+        fmu.freeInstance()
+
+
+def test_model_exchange_tries_steps(tmp_path: Path) -> None:
+    """Only completed steps move the point from which solutions are searched."""
+    unit = Unit(tmp_path, BRANCHES.format(start=""))
+
+    def go(tries: bool) -> list[np.ndarray]:
+        exchange, rows, h = Exchange(unit, 1e-8, {}), [], 0.2
+        fmu, x = exchange.fmu, np.zeros(2)
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        x = exchange.settle(x)
+        for k in range(100):
+            if tries:
+                exchange.rates(k * h + 5, x + 1.7)
+                exchange.rates(k * h, x)
+            k1 = exchange.rates(k * h, x)
+            x = exchange.moved(k * h, x, h, k1)
+            exchange.put((k + 1) * h, x)
+            fmu.completedIntegratorStep()
+            rows.append([*x, *fmu.getReal(unit.of("z"))])
+        fmu.freeInstance()
+        return rows
+
+    rows = go(tries=False)
+    assert rows == go(tries=True)
+    assert abs(rows[-1][-1] - branch(20)) < 1e-6

@@ -104,7 +104,7 @@ def replaced(graph: Graph, roots: Iterable[Value], by: Mapping[Value, Value]) ->
             found[value] = graph.number(FOLDED[value.op](*(new.number for new in given)))
         elif all(new is old for new, old in zip(given, value.arguments, strict=True)):
             found[value] = value
-        elif value.op in ("+", "-", "*"):
+        elif value.op in ("+", "-", "*", "/"):
             found[value] = graph.simple(value.op, *given)
         else:
             found[value] = graph.value(value.op, *given, name=value.name, number=value.number)

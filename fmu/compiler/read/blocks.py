@@ -151,10 +151,20 @@ def _strong(needs: Mapping[str, Iterable[str]]) -> Iterator[set[str]]:
 
 def block(group: Group, entries: Mapping[str, Variable], matched: Mapping[str, str]) -> Block:
     """Return the block of a group: its unknowns, and the other entries in their order."""
-    unknowns = [name for name in group.names if entries[name].section == ALGEBRAIC]
+    implicit = [name for name in group.names if entries[name].section == ALGEBRAIC]
     of_unknown = {unknown: equation for equation, unknown in matched.items()}
-    equations = [of_unknown[name] for name in unknowns]
-    own = [name for name in group.names if name not in unknowns]
+    equations = {of_unknown[name]: None for name in implicit}
+    solved: dict[str, tuple[str, float]] = {}  # unknowns by equations with a factor for them
+    for name in implicit:
+        for equation in sorted(equations, key=lambda other: other != name):
+            factor = _factor(entries[equation].expression.tree, name, implicit)
+            if factor:
+                solved[name] = equation, factor
+                del equations[equation]
+                break
+    unknowns = [name for name in implicit if name not in solved]
+    given = solved | {name: (name, 0.0) for name in group.names if name not in implicit}
+    own = [name for name in group.names if name in given]
     for name in group.names:
         guess = entries[name].guess
         inside = sorted(_read(guess.tree, entries) & {*group.names}) if guess else []
@@ -165,10 +175,15 @@ def block(group: Group, entries: Mapping[str, Variable], matched: Mapping[str, s
             )
     while True:
         left = {
-            name: sorted(_read(entries[name].expression.tree, entries) & {*own} - {*unknowns})
+            name: sorted(
+                other
+                for other in _read(entries[given[name][0]].expression.tree, entries)
+                if other in given and other not in unknowns
+                and not (other == name and name in implicit)
+            )
             for name in own
             if name not in unknowns
-        }
+        }  # fmt: skip
         cycles = [
             members for members in _strong(left)
             if len(members) > 1 or next(iter(members)) in left[next(iter(members))]
@@ -177,10 +192,36 @@ def block(group: Group, entries: Mapping[str, Variable], matched: Mapping[str, s
             break
         for members in cycles:
             unknowns.append(_torn([n for n in own if n in members], left, entries))
-    torn = [name for name in own if name in unknowns]
     rest = [name for name in own if name not in unknowns]
     explicit = in_order(rest, read=lambda name: [n for n in left[name] if n in rest])
-    return Block([*group.names], unknowns, explicit, [*equations, *torn])
+    torn = [given[name][0] for name in own if name in unknowns]
+    return Block(
+        [*group.names], unknowns, {name: given[name] for name in explicit}, [*equations, *torn]
+    )
+
+
+def _factor(tree: Node, unknown: str, unknowns: list[str]) -> float:
+    """Return the number by which an equation has an unknown, for which it can be solved then.
+
+    0 where it has it otherwise, or another unknown by a larger number: to solve it for the smaller
+    one would let errors grow.
+    """
+    factors: dict[str, float] = {}
+    todo, sign = [(tree, 1.0)], {"+": 1.0, "-": -1.0}
+    for node, of in todo:
+        first, last = (*node.arguments, node, node)[:2]
+        if node.op in sign:
+            todo += [(first, of), (last, of * sign[node.op])]
+        elif node.op == "negative":
+            todo.append((first, -of))
+        elif node.op == "*" and first.op == "number":
+            todo.append((last, of * first.value))
+        elif node.op == "name" and node.name in unknowns:
+            factors[node.name] = factors.get(node.name, 0.0) + of
+        elif unknown in names(node):
+            return 0.0
+    own = factors.get(unknown, 0.0)
+    return own if all(abs(own) >= abs(other) for other in factors.values()) else 0.0
 
 
 def _torn(

@@ -134,7 +134,9 @@ class Block:
 
     names: list[str]  # all, in the order of the file
     unknowns: list[str]
-    explicit: list[str]  # the others, in the order of what they name
+    # the others, in the order of what they name: entries that give them and, of [algebraic],
+    # factors of what they are solved for
+    explicit: dict[str, tuple[str, float]]
     equations: list[str]  # entries that give the residuals, one for each unknown
     is_linear: bool = False  # in its unknowns
 

@@ -127,8 +127,13 @@ class Blocks:
         graph, first = self.graph, len(self.graph.relations)
         unknowns = [graph.value(UNKNOWN, name=name) for name in block.unknowns]
         inside = self.known | dict(zip(block.unknowns, unknowns, strict=True))
-        for name in block.explicit:
-            inside[name] = self._value(name, inside)
+        zero = graph.number(0.0)
+        for name, (entry, factor) in block.explicit.items():
+            inside[name] = self._value(entry, inside | {name: zero} if factor else inside)
+            if abs(factor) == 1.0:
+                inside[name] = graph.negative(inside[name]) if factor > 0 else inside[name]
+            elif factor:
+                inside[name] = graph.value("/", inside[name], graph.number(-factor))
         residuals = []
         for name in block.equations:
             value = self._value(name, inside)

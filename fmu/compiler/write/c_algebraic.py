@@ -5,13 +5,12 @@ from collections.abc import Mapping
 
 from ..graph.algebraic import System, components
 from ..graph.graph import CONDITIONS
-from ..names import Field
 from ..read.content import ModelFile
 from . import c_hook
 from .c_code import Code, Leaves, in_row, of_both
-from .c_events import leaves
+from .c_events import arrays, leaves
 from .c_text import indented, text
-from .statements import Block, Operand, Place, Statement, field_of, store
+from .statements import Operand, Place, Statement, store
 
 ANCHORS = "anchors"
 
@@ -20,12 +19,7 @@ def fields(file: ModelFile) -> list[str]:
     """Return the fields of the value structure for unknowns without a start."""
     if not file.anchors:
         return []
-    return ["/* where solutions are searched */", f"double {ANCHORS}[{len(file.anchors)}];"]
-
-
-def anchors(file: ModelFile) -> dict[str, Field]:
-    """Return the fields of unknowns without a start."""
-    return {name: Field(ANCHORS, i) for i, name in enumerate(file.anchors)}
+    return ["/* where solutions are searched */", f"double {ANCHORS}[{2 * len(file.anchors)}];"]
 
 
 def parts(file: ModelFile, followed: list[str]) -> dict[str, list[str]]:
@@ -49,13 +43,14 @@ def parts(file: ModelFile, followed: list[str]) -> dict[str, list[str]]:
         "",
     ]
     if file.anchors:
-        size = f"sizeof(double) * {len(file.anchors)}"
+        size = f"sizeof(double) * {2 * len(file.anchors)}"
         place = f"offsetof({c_hook.structure(file)}, {ANCHORS})"
         solving += [f".anchors = {{{place}, {size}}},", ".anchor = anchor,"]
         solutions += [
-            "static void anchor(void *values_pointer, double time) {",
-            f"    {c_hook.structure(file)} *values = values_pointer;",
-            "    (void)time;",
+            "static void anchor(const void *values_pointer, double time, const double state[],",
+            "                   const double input[], bool is_near, double anchors[]) {",
+            head,
+            "    (void)values;",
             *indented(_anchored(file)),
             "}",
             "",
@@ -152,11 +147,11 @@ def _failures(file: ModelFile) -> list[str]:
 
 
 def _anchored(file: ModelFile) -> list[str]:
-    """Let the next searches begin at the solutions, where there are some."""
-    code, stores = Code(leaves(file)), []
-    for name, field in anchors(file).items():
-        value = code.of(file.anchors[name].value)
-        to = field_of("values", field)
-        stores.append(Block(("isfinite", value), ([store(to, value)],)))
+    """Write the solutions, or the old anchors."""
+    code, stores = Code(arrays(file).but({}, is_near="is_near")), []
+    for i, name in enumerate(file.anchors):
+        value, before = code.of(file.anchors[name].value), code.leaves["anchor", name]
+        kept = "if", ("isfinite", value), value, before
+        stores.append(store(Place("anchors[", i, "]"), kept))
     code.statements += stores
     return code.lines()

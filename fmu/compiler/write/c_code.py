@@ -33,13 +33,13 @@ class Leaves(dict[tuple[str, str], Operand]):
     ) -> None:
         super().__init__(places)
         self.names, self.arrays, self.conditions = names, arrays, conditions
-        self.is_near = False  # solutions are searched near their anchors only
+        self.is_near = "false"  # or true, in C: solutions are searched near their anchors only
         self.count = itertools.count(1)  # of the arrays of systems in a function
 
-    def but(self, own: Mapping[tuple[str, str], Operand], is_near: bool | None = None) -> Leaves:
+    def but(self, own: Mapping[tuple[str, str], Operand], is_near: str = "") -> Leaves:
         """Return these leaves, of which some are elsewhere."""
         found = Leaves({**self, **own}, self.names, self.arrays, self.conditions)
-        found.is_near = self.is_near if is_near is None else is_near
+        found.is_near = is_near or self.is_near
         found.count = self.count
         return found
 
@@ -153,7 +153,7 @@ class Code(Writer):
         count = len(self.leaves.conditions.graph.systems[value.name].unknowns)
         read, guesses = given[:-count], given[-count:]
         has_anchors = any(a.op == "anchor" for a in value.arguments)
-        is_near = "true" if has_anchors and self.leaves.is_near else "false"
+        is_near = self.leaves.is_near if has_anchors else "false"
         self.statements += [
             Statement((f"double {name}[] = ", *in_row(guesses, ""), ";")),
             Statement(

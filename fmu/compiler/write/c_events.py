@@ -71,7 +71,7 @@ def arrays(file: ModelFile) -> Leaves:
             for op, section in (("state", "states"), ("input", "inputs"))
             for i, v in enumerate(file.of(section))
         },
-        is_near=True,
+        is_near="true",
     )
 
 

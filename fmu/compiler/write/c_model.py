@@ -61,7 +61,7 @@ def source(file: ModelFile) -> str:
     has_kinks = _has_kinks(followed) and not file.hook
     followed = ({}, []) if has_kinks else followed
     is_limited = file.hook is not None and file.hook.reach
-    series = Series(file.graph, *followed, leaves(file).but({}, is_near=True), is_limited)
+    series = Series(file.graph, *followed, leaves(file).but({}, is_near="true"), is_limited)
     has_domains = bool(events.located) and _may_end(file)
     smooth = _smooth(file)
     parts = {
