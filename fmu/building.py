@@ -34,7 +34,8 @@ from source_code import Library, Manifest, collect, manifest, write
 C_FILES = ("equations.c", "variables.c")
 PLACES = {"fmi2": "", "fmi3": "fmi3"}  # below the folder of the output
 SYSTEM_COMPILERS = ("gcc", "clang")
-LONG = 200_000  # bytes of C that a compiler optimizes with less time
+# bytes of C that a compiler optimizes with less time, and with much less
+LONG, LONGER = 200_000, 1_000_000
 INSTALL = 'pip install "rparm[build]" installs zig'
 
 
@@ -182,7 +183,9 @@ class Runtime:
 
         def compiled(source: Path) -> Path:
             here = os.path.relpath(source, work)  # no folder's name gets into the object
-            long = filter(None, self.content["long"] if source.stat().st_size > LONG else [])
+            size = source.stat().st_size
+            long = [*filter(None, self.content["long"] if size > LONG else [])]
+            long += ["-O1"] * (size > LONGER)
             self.run(work, *options, *long, *folders, "-c", here, "-o", f"{source.stem}.o")
             return work / f"{source.stem}.o"
 

@@ -375,6 +375,21 @@ struct algebraic_report algebraic_solve(const struct algebraic *system, struct a
     return report;
 }
 
+void algebraic_spread(const struct algebraic *system, struct algebraic_room room,
+                      const double given[], const double unknown[], double error[]) {
+    const int count = system->count;
+    double *e = room.vector;
+    system->evaluate(given, unknown, e, room.matrix); // the room is 0 for a start
+    for (int i = 0; i < count; i++) {
+        e[i] = error[i];
+        for (int j = 0; j < count; j++) {
+            e[i] += noise * fabs(room.matrix[i * count + j] * unknown[j]);
+        }
+    }
+    algebraic_factorize(count, room.matrix, room.pivot);
+    algebraic_bounds(count, room.matrix, room.pivot, e, room.vector + count, error);
+}
+
 /* ---- Messages ------------------------------------------------------------------------------- */
 
 bool algebraic_fails(const struct algebraic *system, struct algebraic_room room,

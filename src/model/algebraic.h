@@ -72,6 +72,11 @@ void algebraic_factorize(int count, double matrix[], int pivot[]);
 void algebraic_substitute(int count, const double matrix[], const int pivot[], const double b[],
                           double x[]);
 
+/* Replaces errors >= 0 of a system's equations by bounds of the errors of its solution `unknown`,
+ * with the rounding of their terms. */
+void algebraic_spread(const struct algebraic *system, struct algebraic_room room,
+                      const double given[], const double unknown[], double error[]);
+
 /* Writes bounds of the solution's errors, where right sides may be wrong by e >= 0. */
 void algebraic_bounds(int count, const double matrix[], const int pivot[], const double e[],
                       double room[], double bound[]);

@@ -3,6 +3,7 @@
 Three operations have several results, of which "component" is one by its number:
     solution   of a system by Newton's method; arguments: what the equations read, then the guesses
     factors    of a matrix; arguments: its elements at the places that `name` has
+    slopes     factors of a system's matrix; arguments: the unknowns, then what its equations read
     linear     solution of linear equations; arguments: factors, then right sides
 Their derivatives follow from the implicit function theorem, and are such operations again.
 """
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     from .graph import Graph, Value
 
 VECTORS = ("solution", "linear")
-SEVERAL = ("factors", *VECTORS)  # with several results
+FACTORS = ("factors", "slopes")
+SEVERAL = (*FACTORS, *VECTORS)  # with several results
 FOLDED = {"+": operator.add, "-": operator.sub, "*": operator.mul, "negative": operator.neg}
 UNKNOWN, GIVEN = "unknown", "given"  # leaves of a system's equations
 
@@ -40,6 +42,7 @@ class System:
     low: list[float]
     high: list[float]
     solution: Value  # where the file has it
+    bends: dict[tuple[int, int], dict[Value, Value]]  # derivatives of the slopes by leaves
     at: dict[Value, Placed] = field(default_factory=dict)  # by solution
 
 
@@ -156,10 +159,13 @@ def solved(
     found = replaced(graph, [*residuals, *slopes.values()], by)
     own_slopes = dict(zip(slopes, found[len(residuals) :], strict=True))
     name = f"{len(graph.systems) + 1}"
+    numbers = [leaf for leaf in given if leaf.op == GIVEN]
+    bends = graph.gradients(own_slopes.values(), [*unknowns, *numbers])
     vector = graph.value("solution", *outside, *guesses(), name=name)
     graph.systems[name] = System(
-        name, names, texts, unknowns, given, found[: len(residuals)], own_slopes, *ranges, vector
-    )
+        name, names, texts, unknowns, given, found[: len(residuals)], own_slopes, *ranges, vector,
+        dict(zip(own_slopes, bends, strict=True)),
+    )  # fmt: skip
     return components(graph, vector, len(unknowns)), False
 
 
@@ -173,14 +179,18 @@ def placed(graph: Graph, solution: Value) -> Placed:
         rows = graph.gradients(system.residuals, moving)
         number = {leaf: i for i, leaf in enumerate(system.given)}
         pairs = [(i, number[leaf], s) for i, row in enumerate(rows) for leaf, s in row.items()]
-        roots = [*system.residuals, *system.slopes.values(), *(slope for *_, slope in pairs)]
+        roots = [*system.residuals, *(slope for *_, slope in pairs)]
         found = replaced(graph, roots, by)
-        count, all_slopes = len(system.residuals), found[len(system.residuals) :]
-        slopes = dict(zip(system.slopes, all_slopes, strict=False))
+        count = len(system.residuals)
         by_given: list[dict[int, Value]] = [{} for _ in system.residuals]
-        for (i, k, _), slope in zip(pairs, all_slopes[len(slopes) :], strict=True):
+        for (i, k, _), slope in zip(pairs, found[count:], strict=True):
             by_given[i][k] = slope
-        system.at[solution] = Placed(found[:count], matrix(graph, slopes), by_given)
+        read = [*by.values()]
+        arguments = [*read[len(system.given) :], *read[: len(system.given)]]
+        factors = graph.value("slopes", *arguments, name=solution.name)
+        if len(system.unknowns) == 1:
+            factors = matrix(graph, {(0, 0): replaced(graph, system.slopes.values(), by)[0]})
+        system.at[solution] = Placed(found[:count], factors, by_given)
     return system.at[solution]
 
 
@@ -204,8 +214,10 @@ def chain(graph: Graph, y: Value, d: Sequence[Value]) -> Value:
         return zero if d[0].op == "number" else component(graph, d[0], int(y.name))
     if y.op == "factors":
         return zero if _rest(d) else graph.value("factors", *d, name=y.name)
+    if y.op == "slopes":
+        return _bent(graph, y, d)
     if y.op == "linear":
-        right = _minus_product(graph, d[1:], y.arguments[0], d[0], y)
+        right = _minus_product(graph, d[1:], d[0], y)
         return _linear(graph, y.arguments[0], right)
     found = placed(graph, y)
     right = [
@@ -213,6 +225,20 @@ def chain(graph: Graph, y: Value, d: Sequence[Value]) -> Value:
         for row in found.by_given
     ]
     return _linear(graph, found.factors, [graph.negative(b) for b in right])
+
+
+def _bent(graph: Graph, y: Value, d: Sequence[Value]) -> Value:
+    """Derivatives of the slopes of a system."""
+    system = graph.systems[y.name]
+    leaves = [*system.unknowns, *system.given]
+    by, rates = dict(zip(leaves, y.arguments, strict=True)), dict(zip(leaves, d, strict=True))
+    found = {}
+    for place, row in system.bends.items():
+        bends = zip(row, replaced(graph, row.values(), by), strict=True)
+        rate = _sum(graph, (graph.scaled(bend, rates[leaf]) for leaf, bend in bends))
+        if not _rest([rate]):
+            found[place] = rate
+    return matrix(graph, found) if found else graph.number(0.0)
 
 
 def second(graph: Graph, y: Value, firsts, d: Sequence[Value], dd: Sequence[Value]) -> Value:
@@ -224,7 +250,7 @@ def second(graph: Graph, y: Value, firsts, d: Sequence[Value], dd: Sequence[Valu
     two = graph.number(2.0)
     if y.op == "linear":
         factors = y.arguments[0]
-        right = _minus_product(graph, dd[1:], factors, dd[0], y)
+        right = _minus_product(graph, dd[1:], dd[0], y)
         if d[0].op != "number" and first.op != "number":
             of_slopes = _minus_product(
                 graph, [graph.number(0.0)] * len(right), factors, d[0], first
@@ -243,7 +269,7 @@ def second(graph: Graph, y: Value, firsts, d: Sequence[Value], dd: Sequence[Valu
         right.append(graph.negative(_sum(graph, terms)))
     if first.op != "number":
         rate = firsts([found.factors])[0]
-        right = _minus_product(graph, right, found.factors, rate, first)
+        right = _minus_product(graph, right, rate, first)
     return _linear(graph, found.factors, right)
 
 
@@ -258,14 +284,12 @@ def _sum(graph: Graph, terms: Iterable[Value]) -> Value:
     return total
 
 
-def _minus_product(
-    graph: Graph, b: Sequence[Value], factors: Value, slopes: Value, x: Value
-) -> list[Value]:
+def _minus_product(graph: Graph, b: Sequence[Value], slopes: Value, x: Value) -> list[Value]:
     """Return b - A' x of a matrix with these derivatives of its elements."""
     found = [*b]
     if slopes.op != "number":
         results = components(graph, x, len(found))
-        for (i, j), slope in zip(places(factors), slopes.arguments, strict=True):
+        for (i, j), slope in zip(places(slopes), slopes.arguments, strict=True):
             found[i] = graph.simple("-", found[i], graph.scaled(results[j], slope))
     return found
 

@@ -569,7 +569,7 @@ class Graph:
                 return self.negative(d[0])
             case "moving_as":
                 return d[1]
-            case "component" | "factors" | "linear" | "solution":
+            case "component" | "factors" | "slopes" | "linear" | "solution":
                 return algebraic.chain(self, y, d)
             case "element":
                 rests = all(is_number(slope, 0.0) for slope in d[1:])

@@ -154,9 +154,11 @@ def block(group: Group, entries: Mapping[str, Variable], matched: Mapping[str, s
     implicit = [name for name in group.names if entries[name].section == ALGEBRAIC]
     of_unknown = {unknown: equation for equation, unknown in matched.items()}
     equations = {of_unknown[name]: None for name in implicit}
+    read = {name: names(entries[name].expression.tree) for name in equations}
     solved: dict[str, tuple[str, float]] = {}  # unknowns by equations with a factor for them
     for name in implicit:
-        for equation in sorted(equations, key=lambda other: other != name):
+        having = (other for other in equations if name in read[other])
+        for equation in sorted(having, key=lambda other: other != name):
             factor = _factor(entries[equation].expression.tree, name, implicit)
             if factor:
                 solved[name] = equation, factor

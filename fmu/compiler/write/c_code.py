@@ -94,6 +94,8 @@ class Code(Writer):
                 return self.constant(Place(f"{given[0]}[", int(value.name), "]"), name=name)
             case "factors":
                 return self._factors(value, given)
+            case "slopes":
+                return self._slopes(value, given)
             case "linear":
                 return self.linear(given)
             case "solution":
@@ -118,6 +120,29 @@ class Code(Writer):
             Statement((f"algebraic_factorize({count}, {factors}, pivot_{number});",))
         )
         return factors
+
+    def _slopes(self, value: Value, given: Sequence[Operand]) -> str:
+        """Return the name of an array with the factorized slopes of a system."""
+        number, count = next(self.leaves.count), self._size(value)
+        factors = f"factors_{number}"
+        self.statements += [
+            Statement((f"double {factors}[{count * (count + 1)}] = {{0.0}};",)),
+            Statement((f"int pivot_{number}[{count}];",)),
+            Statement(
+                (
+                    f"factorize_{value.name}(",
+                    *in_row(given[count:]),
+                    ", ",
+                    *in_row(given[:count]),
+                    f", {factors}, pivot_{number});",
+                )
+            ),
+        ]
+        return factors
+
+    def _size(self, value: Value) -> int:
+        """Return how many unknowns a system has."""
+        return len(self.leaves.conditions.graph.systems[value.name].unknowns)
 
     def linear(self, given: Sequence[Operand]) -> str:
         """Return the name of an array with the solution of linear equations."""
@@ -147,10 +172,21 @@ class Code(Writer):
         self.statements += [Statement((f"double {name}[{count}];",)), Statement(parts)]
         return name
 
+    def spread(self, vector: Value, errors: Sequence[Operand]) -> str:
+        """Return the name of an array with errors of a solution, from those of its equations."""
+        name, count = f"bound_{next(self.leaves.count)}", self._size(vector)
+        read = [self.of(value) for value in vector.arguments[:-count]]
+        parts = (f"spread_{vector.name}(", *in_row(read), f", {self.of(vector)}, {name});")
+        self.statements += [
+            Statement((f"double {name}[] = ", *in_row(errors, ""), ";")),
+            Statement(parts),
+        ]
+        return name
+
     def _solution(self, value: Value, given: Sequence[Operand]) -> str:
         """Return the name of an array with the unknowns of a system."""
         name = f"solution_{next(self.leaves.count)}"
-        count = len(self.leaves.conditions.graph.systems[value.name].unknowns)
+        count = self._size(value)
         read, guesses = given[:-count], given[-count:]
         has_anchors = any(a.op == "anchor" for a in value.arguments)
         is_near = self.leaves.is_near if has_anchors else "false"

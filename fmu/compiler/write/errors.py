@@ -99,27 +99,22 @@ class Errors:
         graph, code = self.graph, self.code
         if vector.op == "linear":
             factors = vector.arguments[0]
-            results = algebraic.components(graph, vector, len(errors) - 1)
-            of_read = [[error] if error != NONE else [] for error in errors[1:]]
-            of_elements = [self.of(element) for element in factors.arguments]
-        else:
-            found = algebraic.placed(graph, vector)
-            factors = found.factors
-            results = algebraic.components(graph, vector, len(found.residuals))
-            of_read = [
-                [("*", ("fabs", code.of(slope)), errors[k]) for k, slope in row.items()
-                 if errors[k] != NONE]
-                for row in found.by_given
-            ]  # fmt: skip
-            of_elements = [NONE] * len(factors.arguments)
-        sums = [reduce(_sum, terms, NONE) for terms in of_read]
-        for (i, j), element, error in zip(
-            algebraic.places(factors), factors.arguments, of_elements, strict=True
-        ):
-            size = ("*", ("*", 4.0, ROUNDING), ("fabs", code.of(element)))
-            own = ("*", _sum(size, error), ("fabs", code.of(results[j])))
-            sums[i] = _sum(sums[i], own)
-        return code.bounds(code.of(factors), sums)
+            sums = [*errors[1:]]
+            results = [code.of(x) for x in algebraic.components(graph, vector, len(sums))]
+            elements = zip(algebraic.places(factors), factors.arguments, strict=True)
+            for (i, j), element in elements:
+                own = _sum(
+                    ("*", ("*", 4.0, ROUNDING), ("fabs", code.of(element))), self.of(element)
+                )
+                sums[i] = _sum(sums[i], ("*", own, ("fabs", results[j])))
+            return code.bounds(code.of(factors), sums)
+        rows = algebraic.placed(graph, vector).by_given
+        terms = [
+            [("*", ("fabs", code.of(slope)), errors[k]) for k, slope in row.items()
+             if errors[k] != NONE]
+            for row in rows
+        ]  # fmt: skip
+        return code.spread(vector, [reduce(_sum, each) if each else NONE for each in terms])
 
     def _in_table(self, table: LookupTable, corner: Sequence[Operand]) -> Operand:
         """Return the value of a table for operands."""
