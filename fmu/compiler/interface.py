@@ -103,8 +103,9 @@ class Declaration:
 
     @property
     def naming(self) -> str:
-        """Whether names have indexes."""
-        return "structured" if any("[" in name for name in self.variables) else "flat"
+        """Whether names have indexes or belong to components."""
+        has_parts = any("[" in name or "." in name for name in self.variables)
+        return "structured" if has_parts else "flat"
 
     @property
     def guid(self) -> str:

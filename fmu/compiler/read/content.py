@@ -74,6 +74,7 @@ class Expression:
     target: str = ""  # the variable or mode that it is assigned to; of a period: time
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
+    is_checked: bool = False  # of a component, which has been checked as a file of its own
     value: Any = field(init=False)  # what a generator makes of it
 
 
@@ -218,6 +219,8 @@ class ModelFile:
     functions: dict[str, Function | Lookup] = field(default_factory=dict)
     tables: dict[str, LookupTable] = field(default_factory=dict)
     code: CodeFile | None = None
+    parts: dict[str, ModelFile] = field(default_factory=dict)  # components, as they were read
+    without_units: set[str] = field(default_factory=set)  # variables of components without any
     header: Any = None  # of its struct of values, if it has C
     hook: Hook | None = None
     sources: list[Path] = field(default_factory=list)  # the files of equations, included ones first

@@ -21,6 +21,7 @@ from ..units import ANGLE, BASE, Unit
 from . import header, keys, terminals
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
+from .components import Components, of_loop
 from .content import (
     BOOLEAN,
     CALCULATED,
@@ -58,8 +59,13 @@ def solver_names() -> set[str]:
     return {name for sections in tables for section in sections.values() for name in section}
 
 
-def read_tables(source: Source, reserved: Iterable[str], is_by_hand: bool = False) -> ModelFile:
-    """Read the tables, without the meaning of the expressions."""
+def read_tables(
+    source: Source,
+    reserved: Iterable[str],
+    is_by_hand: bool = False,
+    above: tuple[Path, ...] = (),
+) -> ModelFile:
+    """Read the tables, without the meaning of the expressions; above: files that have this one."""
     path, text = source.path, source.text
     known = keys.BY_HAND if is_by_hand else keys.HEAD
     head = keys.entries(source.tables, known, "name", "section")
@@ -99,6 +105,8 @@ def read_tables(source: Source, reserved: Iterable[str], is_by_hand: bool = Fals
     _read_functions(file, head.get("functions", {}))
     if "hook" in head:
         _read_hook(file, head)
+    parts = Components(file, read, (*above, path.resolve()))
+    parts.take(head.get("components", {}))
     modes = head.get("modes", [])
     entries = [*keys.SECTIONS, "sampled", "events"]
     if sum(len(head.get(section, {})) for section in entries) + len(modes) > keys.MOST_ENTRIES:
@@ -125,7 +133,9 @@ def read_tables(source: Source, reserved: Iterable[str], is_by_hand: bool = Fals
         _read_event(file, element)
     for message, condition in head.get("check", {}).items():
         _read_check(file, message, condition)
-    file.terminals = terminals.read(file, head.get("terminals", {}))
+    parts.connect(head.get("connections", {}))
+    parts.check_names()
+    file.terminals |= terminals.read(file, head.get("terminals", {}))
     _check_places(file)
     return file
 
@@ -578,13 +588,16 @@ def _hint(variable: Variable | None, is_mode: bool) -> str:
     return f", of {variable.place}: what keeps its value until an event is one of [discrete]"
 
 
-def read(path: Path) -> ModelFile:
-    """Read and check a file; ModelFileError."""
+def read(path: Path, above: tuple[Path, ...] = ()) -> ModelFile:
+    """Read and check a file; ModelFileError. above: files that have it as a component."""
     with placed(path):
         source = source_of(path)
     with located(path, source.text):
-        file = read_tables(source, solver_names())
+        source = replace(source, tables=of_loop(source.tables))
+        file = read_tables(source, solver_names(), above=above)
         file.sources = [each.path for each in source.all()]
+        for part in file.parts.values():
+            file.sources += [path for path in part.sources if path not in file.sources]
         check(file)
     return file
 

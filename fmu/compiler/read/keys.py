@@ -63,7 +63,7 @@ NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
     *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
-    *("functions", "sampled", "events", "check", "terminals", "hook"),
+    *("functions", "sampled", "events", "check", "terminals", "hook", "components", "connections"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}

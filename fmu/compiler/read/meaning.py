@@ -58,6 +58,8 @@ def _add_elements(file: ModelFile) -> None:
             at = tuple(map(int, rest.rstrip("]").split(",")))
             elements.setdefault(base, []).append(at)
     for expression in [*file.assigned, *file.constant, *file.initial, *file.checked]:
+        if expression.is_checked:
+            continue
         with placed(*expression.place):
             if any(node.op == "element" for node in in_order([expression.tree])):
                 expression.tree = with_elements(expression.tree, elements)
@@ -80,6 +82,8 @@ def _check_names(file: ModelFile) -> None:
         (file.checked, parameters | where, "{} is no parameter"),
     ):
         for expression in expressions:
+            if expression.is_checked:
+                continue
             with placed(*expression.place):
                 for node in in_order([expression.tree]):
                     if node.op == "name" and node.name not in allowed:
@@ -92,6 +96,8 @@ def _check_kinds(file: ModelFile) -> None:
     kinds = file.kinds
     plain = {v.expression: v for v in file.of("where") if v.is_real and not v.unit}
     for expression in file.order:
+        if expression.is_checked:
+            continue
         with placed(*expression.place):
             if expression in plain and kind_of(expression.tree, kinds) == CONDITION:
                 plain[expression].kind = expression.kind = CONDITION
@@ -204,15 +210,22 @@ def _known_number(expression: Expression, values: Mapping[str, float]) -> float 
 
 def _check_units(file: ModelFile) -> None:
     """Check that units fit, and find the units of [where]."""
-    declared = [v for v in file.variables.values() if v.section != "where" or v.unit or v.display]
+    declared = [
+        v for v in file.variables.values()
+        if v.section != "where" or v.unit or v.display or v.expression.is_checked
+    ]  # fmt: skip
     units = {v.name: of_exponents(v.exponents) for v in declared} | {"time": SECOND}
     bare = [v.name for v in declared if v.is_real and not (v.unit or v.display)]
     units |= {key: of_exponents(found) for key, found in file.table_units.items()}
+    units |= dict.fromkeys(file.without_units)
     for state in file.of("states"):
-        units[derivative_of(state.name)] = times(units[state.name], SECOND, -1)
+        unit = units[state.name]
+        units[derivative_of(state.name)] = unit and times(unit, SECOND, -1)
     for expression in file.order:
         if expression in file.blocks:
             _add_units(file, file.blocks[expression], units)
+        if expression.is_checked:
+            continue
         with placed(*expression.place):
             expected = units.get(expression.target)
             if expression.is_rate:
@@ -227,6 +240,8 @@ def _check_units(file: ModelFile) -> None:
             units.setdefault(expression.target, unit)
     for variable in file.of("where"):
         if not variable.is_real or variable.unit or variable.display:
+            continue
+        if variable.expression.is_checked:
             continue
         with placed("[where]", variable.name):
             variable.exponents = _whole(units[variable.name])

@@ -1,6 +1,7 @@
 """The graph of a file with equations."""
 
 import math
+from collections import ChainMap
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from pathlib import Path
@@ -15,6 +16,7 @@ from ..plain_c.memory import is_real
 from ..plain_c.text import CTextError
 from . import file as file_reader
 from .code import Calls
+from .components import all_parts
 from .content import (
     ALGEBRAIC,
     CALCULATED,
@@ -63,6 +65,16 @@ def read(path: Path) -> ModelFile:
     known["pi"] = graph.number(math.pi)
     if calls:
         graph.functions = calls.of(file.code.functions) | _written(file, calls, dict(known))
+    in_c = calls.relation_texts if calls else {}
+    for prefix, part in all_parts(file):
+        if part.code:
+            of_part = Calls(part.code.program, graph)
+            own = {name.removeprefix(prefix): x for name, x in known.items()
+                   if name.startswith(prefix)}  # fmt: skip
+            functions = of_part.of(part.code.functions)
+            functions |= _written(part, of_part, own | {"time": known["time"]})
+            graph.functions |= {f"{prefix}{name}": x for name, x in functions.items()}
+            in_c = ChainMap(of_part.relation_texts, in_c)
     counted, checked = {v.name for v in file.calculated if not v.is_real}, {*file.checked}
     sources: list[Expression] = []  # of each relation
     solved: set[Block] = set()
@@ -102,7 +114,6 @@ def read(path: Path) -> ModelFile:
     own |= {variable.value: variable.name for variable in reversed(file.calculated)}
     graph.names |= {value: name for value, name in own.items() if value.arguments}
     places = [source.place for source in sources]
-    in_c = calls.relation_texts if calls else {}
     file.relation_texts = [
         in_c[name]
         if name in in_c
@@ -209,10 +220,13 @@ def _check_constant(file: ModelFile, value: Value) -> None:
 
 
 def _written(
-    file: ModelFile, calls: Calls, known: Mapping[str, Value]
+    file: ModelFile, calls: Calls, known: dict[str, Value]
 ) -> dict[str, Callable[[list[Value], bool], Value]]:
-    """Return the variables that a function of C writes, as functions without arguments."""
-    places = file.header.places
+    """Return the variables that a function of C writes, as functions.
+
+    Of a component they have its inputs as arguments; others have none.
+    """
+    places, inputs = file.header.places, [v.name for v in file.of("inputs", SWITCHES)]
 
     def leaf(place: tuple[str | int, ...], kind: object) -> object:
         name = places.get(place[1:], "")
@@ -226,17 +240,19 @@ def _written(
         return calls.conditions.leaf(name, file.variables[name].numbers)
 
     @cache
-    def values() -> dict[str, Value]:
+    def values(given: tuple[Value, ...]) -> dict[str, Value]:
+        known.update(zip(inputs, given, strict=False))
         found = calls.written(file.calculate, leaf)
         named = {places[place]: value for place, value in found.items() if place in places}
         flat = calls.flat[file.calculate]
         file.code.flat.update({f"{file.calculate}: {name}": flat for name in named})
         return named
 
-    def value(name: str, _given: list[Value], _is_instant: bool) -> Value:
-        if name not in values():
+    def value(name: str, given: list[Value], _is_instant: bool) -> Value:
+        found = values(tuple(given))
+        if name not in found:
             raise CTextError(f"has no value, and {file.calculate} writes none")
-        return values()[name]
+        return found[name]
 
     written = [
         v for v in file.calculated if v.expression.tree.name == f"{file.calculate}: {v.name}"

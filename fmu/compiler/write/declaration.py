@@ -13,6 +13,7 @@ from ..graph.graph import MOVING, Relation, Value
 from ..interface import Declaration, Display
 from ..names import Field
 from ..read import by_hand
+from ..read.components import all_parts
 from ..read.content import (
     ALGEBRAIC,
     CALCULATED,
@@ -204,11 +205,20 @@ def flat(file: ModelFile) -> list[str]:
     for name, expression in called:
         nodes = in_order([expression.tree])
         known = FLAT & {node.function for node in nodes}
-        known |= {f for node in nodes if node.op == "call" for f in file.code.flat[node.name]}
+        known |= {f for node in nodes if node.op == "call" for f in flat_of(file, node.name)}
         leaves = _reached(expression.value.leaves, file, ["discrete"]) if known else ()
         if {op for op, _ in leaves} & {"state", "input", "discrete"}:
             found |= {f"{function} in {name.partition('[')[0]}": None for function in sorted(known)}
     return [*found]
+
+
+def flat_of(file: ModelFile, function: str) -> set[str]:
+    """Return the functions without slope that a function of C calls."""
+    for prefix, part in all_parts(file):
+        if function.startswith(prefix) and part.code:
+            function, file = function.removeprefix(prefix), part
+            break
+    return file.code.flat[function]
 
 
 def modulated(file: ModelFile) -> list[str]:

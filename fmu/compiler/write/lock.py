@@ -17,7 +17,7 @@ Key = tuple[str, str]  # name and kind of a variable
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 99_999
 # longer than in a file: der_ and others stand in front
-ELEMENT = re.compile(r"[A-Za-z]\w*(\[[0-9]+(,[0-9]+)*\])?", re.ASCII)
+ELEMENT = re.compile(r"[A-Za-z]\w*(\.\w+)*(\[[0-9]+(,[0-9]+)*\])?", re.ASCII)
 BARE = re.compile(r"\w+", re.ASCII)  # names that stand without quotes
 HEAD = "# Value references of {name}: written by the build. Keep it with the model.\n"
 
