@@ -58,12 +58,14 @@ VERSIONS = tuple(BUILD_FOLDERS)
 NO_CACHE = "RPARM_NO_CACHE"  # variable of the environment, which --no-cache sets
 
 
-EQUATIONS = {"states", "discrete", "sampled", "where", "outputs", "experiment", "modes"}
+EQUATIONS = {"states", "discrete", "sampled", "algebraic", "where", "outputs"}
+EQUATIONS |= {"experiment", "modes"}
+OF_LOOP = {"start", "stop", "step", "keep", "variants"}  # keys of systems of components only
 # command -> the files that it takes, and keys that such a file has and others do not
 KINDS = {
     "system": ("a system", {"components", "connections"}),
     "campaign": ("a campaign", {"sampling", "runs"}),
-    "build": ("a model of equations", EQUATIONS),
+    "build": ("a model of equations", EQUATIONS | {"components"}),
     "run": ("a scenario", {"model", "fmu", "tolerance", "time"}),
 }
 # what makes such a file of a model of equations
@@ -112,6 +114,12 @@ def scenario_file(given: str | Path, folder: Path = Path()) -> Path:
 def is_of(command: str, content: Iterable[str]) -> bool:
     """Return whether a TOML file has keys of the files that a command takes."""
     return not KINDS[command][1].isdisjoint(content)
+
+
+def is_system(content: Iterable[str]) -> bool:
+    """Return whether a file describes components that run side by side, not one model of them."""
+    keys = {*content}
+    return is_of("system", keys) and bool(OF_LOOP & keys or not EQUATIONS & keys)
 
 
 def refuse_other(path: Path, content: Iterable[str], command: str) -> None:

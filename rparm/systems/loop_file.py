@@ -184,7 +184,7 @@ class LoopReader(Reader):
             if suffix == SUFFIX:
                 self.code(name, given)
                 return
-            if suffix == SSP or (suffix == EQUATIONS and COMPONENTS in read_toml(path)):
+            if suffix == SSP or (suffix == EQUATIONS and project.is_system(read_toml(path))):
                 way_out = "write its components and connections into this file"
                 raise UserError(f"{file} is a system, expected one component: {way_out}")
             if suffix == EQUATIONS:

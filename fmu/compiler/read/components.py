@@ -146,6 +146,9 @@ class Components:
                 raise ModelFileError(f"unit {symbol} has another meaning in another file")
         file.parts[prefix] = part
         for variable in part.variables.values():
+            symbol = variable.unit
+            if symbol and file.unit(symbol).exponents != variable.exponents:
+                raise ModelFileError(f"unit {symbol} has another meaning in another file")
             new = names.variable(variable)
             file.variables[new.name] = new
             if not part.has_units:
@@ -159,7 +162,8 @@ class Components:
             file.checks.append((f"{prefix}: {text}", names.expression(condition)))
         for table in part.tables.items():
             number = len(file.tables)
-            file.tables[names.of(table[0])] = replace(table[1], name=f"{number}_{table[0]}")
+            own = re.sub(r"\W", "_", table[0])
+            file.tables[names.of(table[0])] = replace(table[1], name=f"{number}_{own}")
         file.terminals |= {
             f"{prefix}_{name}": names.terminal(terminal)
             for name, terminal in part.terminals.items()

@@ -1,0 +1,191 @@
+"""One FMU from several files: exact solutions, the same equations in one file, mistakes."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from tests.equations.compiled import ModelFileError, read
+from tests.equations.examples import METHODS, quick
+from tests.support.programs import RPARM, python
+from tests.support.tables import tables
+
+MODELS = tables(str(Path(__file__).with_name("algebraic")))
+
+
+def written(folder: Path, texts: Mapping[str, str], **changed: str) -> Path:
+    """The file of the whole, beside its components."""
+    for name, text in {**texts, **changed}.items():
+        suffix = {"c": "drive.c"}.get(name, f"{name}.toml")
+        (folder / suffix).write_text(text, encoding="utf-8")
+    return folder / "whole.toml"
+
+
+def run(fmu: Path, method: str, stop: float, names: list[str], **start: float) -> np.ndarray:
+    return fmpy.simulate_fmu(
+        str(fmu),
+        stop_time=stop,
+        output_interval=stop / 100,
+        relative_tolerance=1e-11,
+        start_values={"solver_method": METHODS[method], **start},
+        output=names,
+    )
+
+
+def levels(t: float) -> np.ndarray:
+    """Levels (m) of two tanks with both pipes between them; the pump fills the first to 1.8 m."""
+    flow, areas, most = 9.81 * 0.05 * 0.1 / 0.15, (2.0, 1.0), 0.2
+    rates = np.array([[-flow, flow, 0.0], [flow, -flow, 0.0], [0.0, 0.0, 0.0]])
+    rates[:2] /= np.array(areas)[:, None]
+    rates[0, 2] = most / areas[0]
+    start = np.array([1.5, 1.0, 1.0])
+    full = brentq(lambda at: (expm(rates * at) @ start)[0] - 1.8, 0, 50, xtol=1e-14)
+    if t < full:
+        return (expm(rates * t) @ start)[:2]
+    at_full = expm(rates * full) @ start
+    rates[0, 2] = 0.0
+    return (expm(rates * (t - full)) @ at_full)[:2]
+
+
+@pytest.mark.parametrize("method", ["cvode_adams", "erk", "taylor"])
+def test_two_tanks_and_a_junction_are_exact(method: str, tmp_path: Path) -> None:
+    """The junction's pressure is an algebraic unknown; the pump switches off at an event."""
+    fmu = quick(written(tmp_path, MODELS["hydraulics"]), tmp_path)
+    rows = run(fmu, method, 10, ["left.h", "right.h", "p", "first.q", "second.q"])
+    expected = np.array([levels(t) for t in rows["time"]])
+    found = np.stack([rows["left.h"], rows["right.h"]], axis=1)
+    assert np.max(np.abs(found - expected)) < 1e-10
+    assert np.max(np.abs(rows["first.q"] - rows["second.q"])) < 1e-14
+
+
+def test_components_have_the_bits_of_one_file(tmp_path: Path) -> None:
+    texts = MODELS["machine"]
+    whole = quick(written(tmp_path, texts), tmp_path)
+    flat = quick(tmp_path / "flat.toml", tmp_path)
+    same = {"axis.x[1]": "a1", "axis.x[2]": "a2", "other.x[1]": "b1", "axis.held": "ha"}
+    for method in METHODS:
+        parts, one = run(whole, method, 5, [*same]), run(flat, method, 5, [*same.values()])
+        for name, other in same.items():
+            np.testing.assert_array_equal(parts[name], one[other], err_msg=f"{method}: {name}")
+
+
+def test_a_loop_file_becomes_one_fmu(tmp_path: Path) -> None:
+    """Its parameters are starts, its stop is the end of the experiment; a lock file is written."""
+    texts = MODELS["hydraulics"]
+    loop = """
+name = "Loop"
+step = "10 ms"
+stop = "3 s"
+keep = ["left.h"]
+[components]
+left = "tank.toml"
+right = "tank.toml"
+pipe = "pipe.toml"
+[connections]
+left.inflow = "pipe.q"
+"pipe.p1" = "right.p"
+"pipe.p2" = "left.p"
+[inputs]
+"right.inflow" = 0.25
+[parameters]
+left.h = "150 cm"
+right.A = 4
+[variants.other]
+left.h = 3
+"""
+    path = written(tmp_path, texts, whole=loop)
+    ended = python(*RPARM, "build", path, "--output", tmp_path, "--json")
+    assert ended.returncode == 0, ended.stderr
+    description = fmpy.read_model_description(tmp_path / "Loop.fmu")
+    assert description.defaultExperiment.stopTime == "3.0"
+    starts = {v.name: v.start for v in description.modelVariables}
+    assert starts["left.h"] == "1.5" and starts["right.A"] == "4.0"
+    causalities = {v.name: v.causality for v in description.modelVariables}
+    assert causalities["right.inflow"] == "input" and causalities["left.inflow"] == "local"
+    assert '"left.h" = ' in (tmp_path / "whole.lock.toml").read_text("utf-8")
+    tank = texts["tank"].replace('start = 1, unit = "m"', 'start = 7, unit = "m"')
+    (tmp_path / "tank.toml").write_text(tank)
+    ended = python(*RPARM, "build", path, "--output", tmp_path, "--json")
+    starts = fmpy.read_model_description(tmp_path / "Loop.fmu").modelVariables
+    assert next(v.start for v in starts if v.name == "right.h") == "7.0"
+
+
+WHOLE = MODELS["hydraulics"]["whole"]
+MISTAKES = [
+    (
+        'pump = "pump.toml"',
+        'pump = "pmp.toml"',
+        "[components]: pump: pmp.toml: there is no such file",
+    ),
+    ('pump = "pump.toml"', 'pump = "whole.toml"', "whole.toml contains itself"),
+    ('pump = "pump.toml"', 'pump = "Pump.fmu"', "Pump.fmu: only files with equations (.toml) can"),
+    (
+        'pump = "pump.toml"',
+        'pump = "law.py:law"',
+        "law.py:law: only files with equations (.toml) can",
+    ),
+    (
+        'pump = "pump.toml"',
+        'pump = { file = "pump.toml", every = "20 ms" }',
+        "every: a rate is for",
+    ),
+    ('"20000 cm2"', '"20000 cm"', "'20000 cm' does not have the unit of the variable"),
+    ('"20000 cm2"', "-1", "A: -1 is outside [min, max]"),
+    ("k = 0.05", "q = 0.05", "[components]: first: parameters: q: is of [outputs]: no parameter"),
+    ("k = 0.05", "kk = 0.05", "kk: there is no such variable, did you mean 'first.k'?"),
+    ('pump.level = "left.h"', 'pump.levl = "left.h"', "pump.levl: no such input, did you mean"),
+    (
+        'pump.level = "left.h"',
+        'pump.q = "left.h"',
+        "[connections]: pump.q: is of [outputs], no input",
+    ),
+    ('pump.level = "left.h"', 'pump.level = "left.p"', "expected unit m, got m2/s2"),
+    (
+        'pump.level = "left.h"',
+        'pump.level = "left.hh"',
+        "unknown name 'left.hh', did you mean 'left.h'?",
+    ),
+    (
+        'pump.level = "left.h"',
+        'pump.level = "left.h > 1"',
+        "expected a number, '>' gives a condition",
+    ),
+    (
+        'pump.level = "left.h"',
+        'pump.level = "left.h"\n"pump.level" = "right.h"',
+        "pump.level: is there twice",
+    ),
+    ("[components]\n", "[units]\nm2 = { m = 3 }\n[components]\n", "unit m2 has another meaning"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), MISTAKES, ids=[m for *_, m in MISTAKES])
+def test_a_mistake_is_one_line(old: str, new: str, message: str, tmp_path: Path) -> None:
+    path = written(tmp_path, MODELS["hydraulics"], whole=WHOLE.replace(old, new))
+    with pytest.raises(ModelFileError) as refused:
+        read(path)
+    said = str(refused.value)
+    assert message in said and "\n" not in said and len(said) < 500
+
+
+def test_a_mistake_in_a_component_has_its_file_and_line(tmp_path: Path) -> None:
+    wrong = MODELS["hydraulics"]["tank"].replace("g * h", "g * hh")
+    with pytest.raises(ModelFileError) as refused:
+        read(written(tmp_path, MODELS["hydraulics"], tank=wrong))
+    assert (
+        f"left: {tmp_path / 'tank.toml'}: line 10: [outputs]: p: value: column 5: unknown"
+        in str(refused.value)
+    )
+
+
+def test_names_that_are_one_in_c(tmp_path: Path) -> None:
+    (tmp_path / "one.toml").write_text('name = "One"\n[parameters]\nb_c = { start = 1 }\n')
+    (tmp_path / "two.toml").write_text('name = "Two"\n[parameters]\nc = { start = 1 }\n')
+    whole = 'name = "Whole"\n[components]\na = "one.toml"\na_b = "two.toml"\n'
+    (tmp_path / "whole.toml").write_text(whole)
+    with pytest.raises(ModelFileError, match=r"a_b\.c: C has the same name for a\.b_c"):
+        read(tmp_path / "whole.toml")
