@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from typing import Any
 
 from compiler.interface import Declaration
 from compiler.names import OF_VALUES
+from compiler.read.components import all_parts
 from compiler.read.content import ModelFileError
 from compiler.read.model_file import ModelFile
 from compiler.write import declaration, lock
@@ -102,6 +104,7 @@ def build(
         entries[version] = [
             *(built[version] for built in libraries),
             (f"resources/{file.name}.toml", work / "model.toml"),
+            *_component_texts(file),
             *_below(folder, ""),
             *_below(work / "documentation", "documentation/"),
             *_licenses(runtimes),
@@ -109,6 +112,15 @@ def build(
     terminals = work / "terminalsAndIcons.xml"
     entries["fmi3"].append((f"terminalsAndIcons/{terminals.name}", terminals))
     return entries
+
+
+def _component_texts(file: ModelFile) -> Iterable[tuple[str, Path]]:
+    """Return the files that components are made of, by their places in an FMU."""
+    paths = dict.fromkeys(part.path for _, part in all_parts(file))
+    names = Counter(path.name for path in paths)
+    for number, path in enumerate(paths, 1):
+        folder = f"{number}/" if names[path.name] > 1 else ""
+        yield f"resources/components/{folder}{path.name}", path
 
 
 def _libraries(

@@ -71,10 +71,10 @@ def _warnings(file: ModelFile) -> Iterator[str]:
 def _notes(file: ModelFile) -> Iterator[str]:
     """Yield the blocks of entries that need each other: some of them may not be meant."""
     for block in dict.fromkeys(file.blocks.values()):
-        names, kind = block.names, "linear" if block.is_linear else "nonlinear"
+        names = block.names
         more = f", ... ({len(names)})" if len(names) > MOST_SHOWN else ""
         together = "solved together" if len(names) > 1 else "solved"
-        yield f"{', '.join(names[:MOST_SHOWN])}{more}: {together}, {kind}"
+        yield f"{', '.join(names[:MOST_SHOWN])}{more}: {together}, {block.kind}"
 
 
 if __name__ == "__main__":

@@ -1,9 +1,13 @@
 """Equations that need each other: derivatives against mpmath, published problems, failures."""
 
+import os
 import random
 import re
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import fmpy
 import mpmath
@@ -17,7 +21,7 @@ from scipy.special import ellipj, lambertw
 from tests.equations import test_equation_derivatives as plain
 from tests.equations.compiled import Model
 from tests.equations.examples import METHODS, quick
-from tests.equations.hybrid_runs import Exchange, Unit
+from tests.equations.hybrid_runs import Exchange, Unit, co_simulation, model_exchange
 from tests.equations.test_equation_derivatives import (  # noqa: F401
     test_jacobian,
     test_series_fits_the_equations,
@@ -383,3 +387,105 @@ def test_model_exchange_tries_steps(tmp_path: Path) -> None:
     rows = go(tries=False)
     assert rows == go(tries=True)
     assert abs(rows[-1][-1] - branch(20)) < 1e-6
+
+
+# ---- Random models -------------------------------------------------------------------------------
+
+COUNT = int(os.environ.get("ALGEBRAIC_MODELS", "12"))
+
+
+@dataclass(frozen=True)
+class Mixed:
+    """States, a nonlinear and a linear block with corners, and an event on an unknown."""
+
+    a: list[float]
+
+    @classmethod
+    def of(cls, seed: int) -> "Mixed":
+        chance = random.Random(seed)
+        return cls([round(chance.uniform(0.2, 1.0), 3) for _ in range(10)])
+
+    def text(self) -> str:
+        a = self.a
+        return f"""
+name = "Mixed"
+[states]
+x = {{ derivative = "-{a[0]} * x + {a[1]} * z + {a[2]} * sin(3 * time)" }}
+y = {{ start = 0.3, derivative = "{a[3]} * m - 2 * y" }}
+[algebraic]
+z = {{ equation = "z + {a[4]} * tanh(z + x) + 0.6 * {a[5]} * abs(z - 0.1) - drive" }}
+[where]
+drive = "{a[6]} * y + sin(2 * time)"
+m = "0.5 * n + z"
+n = "2 - 0.3 * m - min(x, {a[7]})"
+[events.high]
+when = "z > {a[8]}"
+reinit = {{ x = "x + {a[9]} * (1 + m**2 / 9)" }}
+"""
+
+    def unknowns(self, t: float, x: float, y: float) -> tuple[float, float]:
+        a = self.a
+
+        def missed(z: float) -> float:
+            left = z + a[4] * np.tanh(z + x) + 0.6 * a[5] * abs(z - 0.1)
+            return left - a[6] * y - np.sin(2 * t)
+
+        z = brentq(missed, -30, 30, xtol=1e-15, rtol=1e-15)
+        return z, (0.5 * (2 - min(x, a[7])) + z) / 1.15
+
+    def motion(self, stop: float, times: np.ndarray) -> tuple[np.ndarray, list[float]]:
+        """The states by scipy, and the times of the events."""
+        a = self.a
+
+        def rates(t: float, s: np.ndarray) -> list[float]:
+            z, m = self.unknowns(t, *s)
+            return [-a[0] * s[0] + a[1] * z + a[2] * np.sin(3 * t), a[3] * m - 2 * s[1]]
+
+        def high(t: float, s: np.ndarray) -> float:
+            return self.unknowns(t, *s)[0] - a[8]
+
+        high.terminal, high.direction = True, 1.0
+        t, state, found, events = 0.0, np.array([0.0, 0.3]), np.full((len(times), 2), np.nan), []
+        while t < stop and not (len(events) > 5 or (events[1:] and events[-1] - events[-2] < 0.05)):
+            part = solve_ivp(
+                rates, (t, stop), state, "DOP853", events=high, rtol=1e-10, atol=1e-12,
+                max_step=0.02, dense_output=True,
+            )  # fmt: skip
+            inside = (times >= t) & (times <= part.t[-1])
+            if inside.any():
+                found[inside] = part.sol(times[inside]).T
+            t, state = part.t[-1], part.y[:, -1].copy()
+            if part.status == 1:
+                events.append(t)
+                state[0] += a[9] * (1 + self.unknowns(t, *state)[1] ** 2 / 9)
+                found[times >= t] = np.nan
+        return found, events
+
+
+def failure(seed: int) -> str:
+    """What is wrong with the runs of a random model; nothing if they follow scipy."""
+    mixed, step, count = Mixed.of(seed), 0.05, 80
+    times = step * np.arange(1, count + 1)
+    expected, events = mixed.motion(step * count, times)
+    away = np.array([all(abs(t - at) > 1e-5 for at in events) for t in times])
+    away &= np.isfinite(expected[:, 0])  # events that follow each other fast are not judged
+    with TemporaryDirectory() as folder:
+        unit = Unit(Path(folder), mixed.text())
+        for kind in [*METHODS, "model_exchange"]:
+            if kind == "model_exchange":
+                found = model_exchange(unit, 1e-10, step, count, {})
+            else:
+                found = co_simulation(unit, kind, 1e-10, step, count, {}, events)
+            if found.failure or found.differences:
+                return f"{seed} {kind}: {found.failure} {found.differences}"
+            error = np.max(np.abs(np.array(found.x) - expected)[away])
+            if not error < 1e-6:
+                return f"{seed} {kind}: error {error}, events at {events}"
+    return ""
+
+
+def test_random_models_follow_scipy() -> None:
+    """Each in all methods with snapshots, and in Model Exchange."""
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        found = [text for text in pool.map(failure, range(COUNT)) if text]
+    assert not found, "\n".join(found)

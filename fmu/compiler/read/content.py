@@ -141,6 +141,11 @@ class Block:
     equations: list[str]  # entries that give the residuals, one for each unknown
     is_linear: bool = False  # in its unknowns
 
+    @property
+    def kind(self) -> str:
+        """How it is solved."""
+        return "linear" if self.is_linear else "nonlinear, by Newton's method"
+
 
 @dataclass
 class Change:

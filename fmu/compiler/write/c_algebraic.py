@@ -123,6 +123,7 @@ def _given(file: ModelFile, system: System, number: int) -> Operand:
     """Return where equations read a value from outside."""
     value = system.solution.arguments[number]
     name = value.name if not value.arguments else file.graph.names.get(value, "")
+    name = "" if name in file.graph.relations or name in file.graph.segments else name
     place = Place("given[", number, "]", name, is_opaque=bool(name))
     return ("!=", place, 0.0) if value.op in CONDITIONS else place
 

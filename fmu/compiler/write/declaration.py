@@ -252,11 +252,22 @@ def modulated(file: ModelFile) -> list[str]:
 
 def page(file: ModelFile) -> str:
     """Return the text of README.md: the description and the file itself."""
-    runs = re.findall("`+", file.text)
-    fence = "`" * max(3, 1 + max(map(len, runs), default=0))
     plain = "".join(f"\\{c}" if c in string.punctuation else c for c in file.description)
     head = f"# {file.name}\n\n{plain}\n\n## Equations\n\nThis file is the model:\n"
-    return f"{head}\n{fence}toml\n{file.text.rstrip()}\n{fence}\n"
+    found = [head + _fenced(file.text)]
+    if file.blocks:
+        lines = [f"- `{', '.join(b.names)}`: {b.kind}" for b in dict.fromkeys(file.blocks.values())]
+        found += ["## Solved together\n", *lines, ""]
+    texts = {part.path.resolve(): part for _, part in all_parts(file)}
+    for part in texts.values():
+        found.append(f"## {part.name}\n\nComponents are made of this file:\n{_fenced(part.text)}")
+    return "\n".join(found)
+
+
+def _fenced(text: str) -> str:
+    runs = re.findall("`+", text)
+    fence = "`" * max(3, 1 + max(map(len, runs), default=0))
+    return f"\n{fence}toml\n{text.rstrip()}\n{fence}\n"
 
 
 def _causality(variable: Variable) -> str:
