@@ -100,6 +100,9 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
     plans: list[tuple[Section, dict[str, Reference | None]]] = []
     for system, names in chosen:
         references: dict[str, Reference | None] = dict.fromkeys(names)
+        if options.exact and (system.folder or system.ssp.path.suffix.lower() != ".toml"):
+            what = "a loop file whose components are all files with equations"
+            raise UserError(f"{system.ssp.path}: --exact expects {what}")
         if system.folder and system.study:
             given = system.folder, system.study.EXPERIMENT
             references = {n: comparison.load_reference(system.ssp, n, *given) for n in names}
@@ -120,7 +123,7 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
         table = VariantTable(references, section.measures, error_title)
         for name, reference in references.items():
             try:
-                outcome = _simulated(section, name, reference, engine)
+                outcome = _simulated(section, name, reference, engine, options.exact)
             except UserError as error:
                 failures[name] = error
                 table.failed(name)
@@ -135,6 +138,10 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
             if outcome.is_estimate:
                 console.remark(system_page.estimate(outcome))
                 found = {f"coupling_{key}": value for key, value in found.items()}
+                if outcome.exact_errors:
+                    console.remark(system_page.true_error(outcome))
+                    worst = max(outcome.exact_errors, key=outcome.exact_errors.__getitem__)
+                    found |= {"true_error": outcome.exact_errors[worst], "true_worst": worst}
             else:
                 found |= {"bound": comparison.BOUND, "passed": outcome.passed}
             rows.append(
@@ -174,13 +181,15 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
 
 
 def _simulated(
-    section: Section, name: str, reference: Reference | None, engine: comparison.Engine
-) -> Outcome:
-    """Run a variant, with a bar on a terminal if that takes long."""
+    section: Section, name: str, reference: Reference | None, engine: comparison.Engine,
+    exact: bool,
+) -> Outcome:  # fmt: skip
+    """Run a variant, with a bar on a terminal if that takes long; exact: as one FMU, too."""
     steps = section.ssp.system.steps
     if reference is not None:
         with Progress(name, steps) as progress:
             return comparison.simulate(section.ssp, name, reference, engine, progress)
     estimates = not comparison.why_no_estimate(section.ssp)
     with Progress(name, 3 * steps if estimates else steps) as progress:
-        return comparison.run_alone(section.ssp, name, section.names, engine, progress)
+        outcome = comparison.run_alone(section.ssp, name, section.names, engine, progress)
+    return comparison.with_exact(outcome, section.ssp, section.names) if exact else outcome

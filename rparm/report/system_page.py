@@ -199,6 +199,13 @@ def estimate(outcome: Outcome) -> str:
     return f"coupling error about {size} ({outcome.worst}), by half the step"
 
 
+def true_error(outcome: Outcome) -> str:
+    """Say how far the run is from one of the same files as one FMU."""
+    worst = max(outcome.exact_errors, key=outcome.exact_errors.__getitem__)
+    size = exponents(f"{outcome.exact_errors[worst]:.2g}")
+    return f"true coupling error {size} ({worst}), from the same files as one FMU"
+
+
 def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:
     """Write the page of a variant that stopped early: what was recorded until then."""
     folder, system = _folder(report, section), section.ssp.system
@@ -286,6 +293,8 @@ def _plot(ssp: OpenedSystem, outcome: Outcome, diagram: Diagram) -> Plot:
     for name in diagram.curves:
         wanted = diagram.references.get(name)
         reference = None if wanted is None else outcome.column(wanted)
+        if outcome.exact is not None:
+            reference = outcome.exact[:, outcome.run.names.index(name)]
         steps = ssp.variable(name).type != "Real"
         curves.append(result_curve(name, outcome.column(name), reference, steps))
     variables = [ssp.variable(name) for name in diagram.curves]
@@ -300,6 +309,7 @@ def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
         ("time", f"{system.start:g} to {system.stop:g} s"),
         ("steps", str(outcome.steps)),
         _error(outcome),
+        *_true_error(outcome),
         *_measures(section, outcome),
         ("wall time", seconds(outcome.run.wall_time)),
     ]
@@ -309,6 +319,12 @@ def _error(outcome: Outcome) -> tuple[str, str]:
     if outcome.is_estimate:
         return "coupling error", estimate(outcome).removeprefix("coupling error ")
     return "worst error", f"{outcome.error:.1e} of {short(BOUND)} ({outcome.worst})"
+
+
+def _true_error(outcome: Outcome) -> list[tuple[str, str]]:
+    if not outcome.exact_errors:
+        return []
+    return [("true coupling error", true_error(outcome).removeprefix("true coupling error "))]
 
 
 def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
@@ -364,6 +380,16 @@ def _solvers(ssp: OpenedSystem, run: ecos.Run) -> list[PageTable]:
 
 def _errors(ssp: OpenedSystem, outcome: Outcome) -> list[PageTable]:
     found = outcome.errors.items()
+    tables = []
+    if outcome.exact_errors:
+        exact = [
+            (name, unit(ssp.variable(name).unit), f"{error:.2e}")
+            for name, error in outcome.exact_errors.items()
+        ]
+        note = "Largest difference from a run of the same files as one FMU, whose curves are the "
+        note += "references in the plots, relative to the largest value of this unit."
+        title, head = "True coupling errors of all variables", ("variable", "unit", "error")
+        tables.append(PageTable(title, head, exact, note, folded=True))
     rows = [(name, unit(ssp.variable(name).unit), f"{error:.2e}") for name, error in found]
     note = "Largest difference from the reference of Ecos's order, relative to the variable's "
     note += "largest value."
@@ -373,4 +399,4 @@ def _errors(ssp: OpenedSystem, outcome: Outcome) -> list[PageTable]:
         note = "Twice the largest difference from a run with half the step, as of an error of "
         note += "first order, relative to the largest value of all variables of this unit."
     head = "variable", "unit", "error"
-    return [PageTable(title, head, rows, note, folded=True)] if rows else []
+    return tables + ([PageTable(title, head, rows, note, folded=True)] if rows else [])

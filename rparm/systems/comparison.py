@@ -11,16 +11,19 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from rparm import files, project
+from rparm import building, files, project
 from rparm.errors import UserError
 from rparm.files import is_file
-from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.fmu_file import Fmu, read_model
+from rparm.interruption import temporary_folder
+from rparm.project import VERSIONS
 from rparm.runs import comparison
 from rparm.runs.comparison import Compared, Summed
 from rparm.systems import ecos
-from rparm.systems.master import Master
-from rparm.systems.structure import OpenedSystem
+from rparm.systems.master import Master, run_in_master
+from rparm.systems.structure import Component, Connector, OpenedSystem
 
+WHOLE = "whole"  # the name of a system as one component
 BOUND = 1e-7  # on the relative error of every variable
 
 
@@ -48,6 +51,8 @@ class Outcome(Compared):
     errors: dict[str, float]  # largest of each variable, relative
     why: str = ""  # there are no errors, in an estimate
     is_estimate: bool = False
+    exact: np.ndarray | None = None  # (rows, names): the same system as one FMU
+    exact_errors: dict[str, float] = field(default_factory=dict)  # likewise, from that
 
     @property
     def passed(self) -> bool:
@@ -91,6 +96,41 @@ def run_alone(
         except UserError as error:  # an FMU may allow one step only
             why = f"half the step fails, {error}"
     return Outcome(variant, ssp.system.steps, run, errors, why, is_estimate=True)
+
+
+def with_exact(outcome: Outcome, ssp: OpenedSystem, names: Sequence[str]) -> Outcome:
+    """Compare a run with one of the same files as one FMU, which has no communication step."""
+    with temporary_folder() as folder:
+        fmu = building.build(ssp.path, output=folder, lock=False)[VERSIONS.index(ssp.version)]
+        whole = _as_one(ssp, outcome.variant, fmu, folder)
+        exact = run_in_master(whole, outcome.variant, [f"{WHOLE}.{name}" for name in names]).values
+    real = [name for name in kept(ssp) if ssp.variable(name).type == "Real"]
+    columns = [names.index(name) for name in real]
+    apart = np.abs(outcome.run.values[:, columns] - exact[:, columns]).max(axis=0)
+    errors = dict(zip(real, (apart / _sizes(ssp, real, exact[:, columns])).tolist(), strict=True))
+    return replace(outcome, exact=exact, exact_errors=errors)
+
+
+def _as_one(ssp: OpenedSystem, variant: str, fmu: Path, folder: Path) -> OpenedSystem:
+    """Return the system with one component: its FMU, whose names begin with the components'."""
+    model, system = read_model(fmu), ssp.system
+    ends = [v for v in model.variables.values() if v.causality in ("input", "output")]
+    connectors = {v.name: Connector(v.name, v.causality, v.type, v.unit) for v in ends}
+    values = {
+        f"{component}.{name}": value
+        for component, own in system.parameters[variant].items()
+        for name, value in own.items()
+    }
+    one = replace(
+        system,
+        components=(Component(WHOLE, fmu.relative_to(folder).as_posix(), connectors),),
+        connections=(),
+        parameters={variant: {WHOLE: values}},
+        inputs={f"{WHOLE}.{name}": signal for name, signal in system.inputs.items()},
+        keep=None,
+    )
+    files, models = {WHOLE: fmu}, {WHOLE: model}
+    return replace(ssp, folder=folder, system=one, models=models, files=files, python={})
 
 
 def why_no_estimate(ssp: OpenedSystem) -> str:

@@ -1,5 +1,6 @@
 """One FMU from several files: exact solutions, the same equations in one file, mistakes."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -189,3 +190,39 @@ def test_names_that_are_one_in_c(tmp_path: Path) -> None:
     (tmp_path / "whole.toml").write_text(whole)
     with pytest.raises(ModelFileError, match=r"a_b\.c: C has the same name for a\.b_c"):
         read(tmp_path / "whole.toml")
+
+
+def test_the_true_coupling_error_is_of_first_order(tmp_path: Path) -> None:
+    """As that of held inputs; the estimate by half the step is near to it."""
+    loop = """
+name = "Loop"
+step = "{step} ms"
+stop = "2 s"
+[components]
+left = "tank.toml"
+right = "tank.toml"
+pipe = "pipe.toml"
+back = "pipe.toml"
+[connections]
+left.inflow = "pipe.q"
+right.inflow = "back.q"
+pipe.p1 = "right.p"
+pipe.p2 = "left.p"
+back.p1 = "left.p"
+back.p2 = "right.p"
+[parameters]
+left.h = 2.5
+"""
+    found = []
+    for step in (10, 5):
+        path = written(tmp_path, MODELS["hydraulics"], whole=loop.replace("{step}", f"{step}"))
+        ended = python(*RPARM, "system", path, "--exact", "--output", tmp_path / "r", "--json")
+        assert ended.returncode == 0, ended.stderr
+        (row,) = json.loads(ended.stdout)["variants"]
+        assert abs(row["coupling_error"] / row["true_error"] - 1) < 0.1
+        found.append(row["true_error"])
+    assert abs(found[0] / found[1] - 2) < 0.05
+    path.write_text(path.read_text().replace('back = "pipe.toml"', 'back = "back.py:flow"'))
+    (tmp_path / "back.py").write_text("def flow(t, h, inputs):\n    return {'q': 0.0}\n")
+    ended = python(*RPARM, "system", path, "--exact", "--output", tmp_path / "r", "--json")
+    assert ended.returncode == 2 and "only files with equations (.toml) can be" in ended.stderr
