@@ -60,19 +60,19 @@ static bool factorize(int count, double matrix[], int pivot[]) {
         pivot[0] = 0;
         return matrix[0] != 0.0 && isfinite(matrix[0]);
     }
-    double *scale = matrix + count * count;
+    double *scale = matrix + (ptrdiff_t)count * count;
     write_scales(count, matrix, scale);
     for (int k = 0; k < count; k++) {
         const int row = pivot_row(count, matrix, scale, k);
         pivot[k] = row;
         swap_rows(count, matrix, k, row);
         scale[row] = scale[k];
-        const double *upper = matrix + k * count;
+        const double *upper = matrix + (ptrdiff_t)k * count;
         if (upper[k] == 0.0 || !isfinite(upper[k])) {
             return false;
         }
         for (int i = k + 1; i < count; i++) {
-            double *own = matrix + i * count;
+            double *own = matrix + (ptrdiff_t)i * count;
             if (own[k] == 0.0) {
                 continue;
             }
@@ -264,8 +264,8 @@ static bool bisect(const struct newton *newton, double unknown[]) {
     if (!((at_low <= 0.0 && at_high >= 0.0) || (at_low >= 0.0 && at_high <= 0.0))) {
         return false;
     }
-    for (double middle = 0.5 * low + 0.5 * high; middle > low && middle < high;
-         middle = 0.5 * low + 0.5 * high) {
+    double middle = 0.5 * low + 0.5 * high;
+    while (middle > low && middle < high) {
         double value;
         system->evaluate(newton->given, &middle, &value, NULL);
         if (isnan(value)) {
@@ -273,6 +273,7 @@ static bool bisect(const struct newton *newton, double unknown[]) {
         }
         const bool is_below = (value < 0.0) == (at_low < 0.0) && value != 0.0;
         *(is_below ? &low : &high) = middle;
+        middle = 0.5 * low + 0.5 * high;
     }
     double of_low;
     system->evaluate(newton->given, &low, &of_low, NULL);
@@ -354,13 +355,13 @@ struct algebraic_report algebraic_solve(const struct algebraic *system, struct a
         .system = system,
         .given = given,
         .matrix = room.matrix,
-        .next = room.matrix + count * (count + 1),
+        .next = room.matrix + (ptrdiff_t)count * (count + 1),
         .residual = room.vector,
         .step = room.vector + count,
-        .ahead = room.vector + 2 * count,
-        .trial = room.vector + 3 * count,
-        .size = room.vector + 4 * count,
-        .before = room.vector + 5 * count,
+        .ahead = room.vector + (ptrdiff_t)2 * count,
+        .trial = room.vector + (ptrdiff_t)3 * count,
+        .size = room.vector + (ptrdiff_t)4 * count,
+        .before = room.vector + (ptrdiff_t)5 * count,
         .pivot = room.pivot,
     };
     struct algebraic_report report = {.iterations = 0};

@@ -25,10 +25,6 @@ struct call {
     const double *largest_inputs; /* as in struct event */
 };
 
-static const int *modes_in(const struct relations *model, const void *values) {
-    return (const int *)(const void *)((const char *)values + model->modes.offset);
-}
-
 static struct call call_of(const struct relations *model, struct relations_room room, void *values,
                            double t, const double du[], const double largest_inputs[]) {
     int *modes = (int *)(void *)((char *)values + model->modes.offset);
@@ -260,7 +256,7 @@ static void set_first_modes(const struct call *call) {
 
 const void *relations_followed(const struct relations *model, struct relations_room room,
                                const void *values, double t, void *copy) {
-    const int is_begun = *modes_in(model, values);
+    const int is_begun = *relations_modes(model, values);
     if (is_begun && !model->has_inputs) {
         return values;
     }
@@ -277,44 +273,12 @@ const void *relations_followed(const struct relations *model, struct relations_r
     return copy;
 }
 
-static const double *discrete_in(const struct relations *model, const void *values) {
-    return (const double *)(const void *)((const char *)values + model->discrete.offset);
-}
-
 static const double *states_in(const struct relations *model, const void *values) {
     return (const double *)(const void *)((const char *)values + model->states);
 }
 
 static double *discrete_of(const struct call *call) {
     return (double *)(void *)((char *)call->values + call->model->discrete.offset);
-}
-
-/* Returns the time of a sampler's next tick, s: never a sum of periods, which would drift. INFINITY
- * with a period of 0. */
-static double tick_time(const struct relations *model, struct relations_room room,
-                        const void *values, int sampler) {
-    const double *discrete = discrete_in(model, values);
-    if (room.every[sampler] == 0.0) {
-        return INFINITY;
-    }
-    return discrete[0] + (room.offset[sampler] + discrete[1 + sampler] * room.every[sampler]);
-}
-
-double relations_next_time(const struct relations *model, struct relations_room room,
-                           const void *values) {
-    const int *modes = modes_in(model, values);
-    double next = INFINITY;
-    model->write_times(values, room.times);
-    model->write_periods(values, room.every, room.offset);
-    for (int i = 0; i < model->sampler_count && modes[0]; i++) {
-        next = fmin(next, tick_time(model, room, values, i));
-    }
-    for (int k = 0; k < model->relation_count && modes[0]; k++) {
-        const struct relation *relation = &model->relation[k];
-        const bool is_ahead = relation->is_timed && modes[1 + k] != relation->rises;
-        next = is_ahead ? fmin(next, room.times[k]) : next;
-    }
-    return next;
 }
 
 /* Returns the slope of the distance with the sign of the mode. */
@@ -462,7 +426,7 @@ static bool is_due(const struct call *call, int sampler, double t, double *tick)
     /* of the sum that is the time of the tick: its parts may cancel */
     const double size = fabs(discrete[0]) + fabs(call->room.offset[sampler]) +
                         discrete[1 + sampler] * call->room.every[sampler];
-    *tick = tick_time(call->model, call->room, call->values, sampler);
+    *tick = relations_tick_time(call->model, call->room, call->values, sampler);
     return *tick <= t + 4.0 * DBL_EPSILON * size;
 }
 
@@ -666,47 +630,4 @@ enum status relations_update(const struct relations *model, struct relations_roo
         status = STATUS_INTERNAL;
     }
     return status;
-}
-
-void relations_errors(const struct relations *model, struct relations_room room, const void *values,
-                      double t, const double state_errors[], const double largest_inputs[],
-                      double relative, double errors[]) {
-    const struct given given = {state_errors, relative * fabs(t), relative, largest_inputs,
-                                room.zeros};
-    model->compare(values, t, &given, room.compared);
-    for (int k = 0; k < model->relation_count; k++) {
-        if (!model->relation[k].is_timed) {
-            const double noise = room.compared[k].noise;
-            errors[model->relation[k].indicator] = isfinite(noise) ? noise : 0.0;
-        }
-    }
-}
-
-/* True if the number is a count of ticks. */
-static bool is_count(double ticks) {
-    return ticks >= 0.0 && ticks <= 0x1p53 && ticks == floor(ticks);
-}
-
-bool relations_are_plausible(const struct relations *model, const void *values) {
-    const int *modes = modes_in(model, values);
-    const int count = (int)(model->modes.size / sizeof *modes);
-    const int segments = 1 + model->relation_count + model->event_count + 1;
-    const int counts = segments + model->segment_count;
-    bool are_fine = modes[0] == 1;
-    for (int i = 0; i < count; i++) {
-        int first = 0;
-        int last = 1;
-        if (i >= counts) {
-            first = model->count[i - counts].first;
-            last = model->count[i - counts].last;
-        } else if (i >= segments) {
-            first = model->segment[i - segments].first;
-            last = model->segment[i - segments].last;
-        }
-        are_fine = are_fine && modes[i] >= first && modes[i] <= last;
-    }
-    for (int i = 0; i < model->sampler_count; i++) {
-        are_fine = are_fine && is_count(discrete_in(model, values)[1 + i]);
-    }
-    return are_fine;
 }

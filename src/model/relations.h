@@ -114,6 +114,19 @@ struct relations_room {
     const double *zeros;                /* one per state and input */
 };
 
+static inline const int *relations_modes(const struct relations *model, const void *values) {
+    return (const int *)(const void *)((const char *)values + model->modes.offset);
+}
+
+static inline const double *relations_discrete(const struct relations *model, const void *values) {
+    return (const double *)(const void *)((const char *)values + model->discrete.offset);
+}
+
+/* Returns the time of a sampler's next tick, s: never a sum of periods, which would drift. INFINITY
+ * with a period of 0. room has the periods. */
+double relations_tick_time(const struct relations *model, struct relations_room room,
+                           const void *values, int sampler);
+
 /* Functions of struct model_events. */
 double relations_next_time(const struct relations *model, struct relations_room room,
                            const void *values);

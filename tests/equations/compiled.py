@@ -72,7 +72,8 @@ class Model:
         command = ["cc", "-std=c17", level, "-ffp-contract=off", "-shared", "-fPIC", *warnings]
         shared = ROOT / "src" / "model"
         runtime = [
-            shared / name for name in ("algebraic.c", "relations.c", "domains.c", "random.c")
+            shared / name
+            for name in ("algebraic.c", "relations.c", "relations_asked.c", "domains.c", "random.c")
         ]
         sources = [folder / "equations.c", *runtime]
         files = [*sorted(shared.glob("*.?")), folder / "equations.h", folder / "equations.c"]

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from ..expressions.expression import in_order
@@ -112,6 +112,25 @@ def replaced(graph: Graph, roots: Iterable[Value], by: Mapping[Value, Value]) ->
         else:
             found[value] = graph.value(value.op, *given, name=value.name, number=value.number)
     return [found[root] for root in roots]
+
+
+def put(graph: Graph, by: Mapping[Value, Value], first: int) -> None:
+    """Let relations from the `first` on, and what else is known, follow from other values."""
+    for name, relation in [*graph.relations.items()][first:]:
+        distance, limit = replaced(
+            graph, [relation.distance, relation.limit or relation.distance], by
+        )
+        limit = limit if relation.limit else None
+        graph.relations[name] = replace(relation, distance=distance, limit=limit)
+    own = {(unknown.op, unknown.name) for unknown in by}
+    for name, segment in graph.segments.items():
+        if segment.argument.leaves & own:
+            (argument,) = replaced(graph, [segment.argument], by)
+            low, high = (graph.relations[end.name] for end in (segment.low, segment.high))
+            graph.segments[name] = replace(segment, argument=argument, low=low, high=high)
+    for condition, unknown in graph.unknowns.items():
+        if unknown is not None and unknown.leaves & own:
+            (graph.unknowns[condition],) = replaced(graph, [unknown], by)
 
 
 def solved(

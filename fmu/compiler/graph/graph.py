@@ -405,24 +405,6 @@ class Graph:
             now[v] = later[v] if has_passed else self._with(v, now)
         return now[root]
 
-    def put(self, by: Mapping[Value, Value], first: int) -> None:
-        """Let relations from the `first` on, and what else is known, follow from other values."""
-        for name, relation in [*self.relations.items()][first:]:
-            distance, limit = algebraic.replaced(
-                self, [relation.distance, relation.limit or relation.distance], by
-            )
-            limit = limit if relation.limit else None
-            self.relations[name] = replace(relation, distance=distance, limit=limit)
-        own = {(unknown.op, unknown.name) for unknown in by}
-        for name, segment in self.segments.items():
-            if segment.argument.leaves & own:
-                (argument,) = algebraic.replaced(self, [segment.argument], by)
-                low, high = (self.relations[end.name] for end in (segment.low, segment.high))
-                self.segments[name] = replace(segment, argument=argument, low=low, high=high)
-        for condition, unknown in self.unknowns.items():
-            if unknown is not None and unknown.leaves & own:
-                (self.unknowns[condition],) = algebraic.replaced(self, [unknown], by)
-
     def given(self, value: Value, number: int) -> Value:
         """A leaf that stands for a value in equations of a system."""
         op = "mode" if value.op in CONDITIONS else GIVEN
@@ -665,32 +647,3 @@ def is_number(value: Value, number: float) -> bool:
 def unsigned(value: Value) -> Value:
     """The value, without the minus in front."""
     return value.arguments[0] if value.op == "negative" else value
-
-
-def read_in_series(value: Value) -> tuple[Value, ...]:
-    """Those of which the series of a value reads coefficients of the same order."""
-    if not value.moves or value.op in CONDITIONS:
-        return ()
-    if value.op == "solution":
-        return tuple(v for v in value.arguments if v.op not in CONDITIONS)
-    if value.op == "if":
-        return value.arguments[2:] if is_unknown(value) else value.arguments[1:]
-    return value.arguments[1:] if value.op == "moving_as" else value.arguments
-
-
-def with_partials(graph: Graph, roots: Iterable[Value]) -> list[Value]:
-    """All values that the series of the roots follow from."""
-    done: dict[Value, None] = {}
-    todo = list(roots)
-    while todo:
-        new = in_order(todo, done, read_in_series)
-        done |= dict.fromkeys(new)
-        todo = [
-            unsigned(partial)
-            for value in new if value.moves and value.op in DERIVATIVES
-            for x, partial in zip(value.arguments, graph.partials(value), strict=True) if x.moves
-        ]  # fmt: skip
-        for value in new:
-            if value.moves and value.op in algebraic.VECTORS:
-                todo += algebraic.equations(graph, value)[0]
-    return list(done)

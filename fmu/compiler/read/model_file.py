@@ -162,7 +162,7 @@ class Blocks:
                 self._ranges(block.unknowns),
             )
         by = dict(zip(unknowns, found, strict=True))
-        graph.put(by, first)
+        algebraic.put(graph, by, first)
         for name in block.explicit:
             (self.entries[name].expression.value,) = algebraic.replaced(graph, [inside[name]], by)
         for name, value in zip(block.unknowns, found, strict=True):

@@ -11,7 +11,8 @@ from functools import reduce
 from typing import TYPE_CHECKING
 
 from ..expressions.expression import in_order
-from ..graph.graph import CONDITIONS, DERIVATIVES, Graph, Value, read_in_series, unsigned
+from ..graph.coefficients import read_in_series
+from ..graph.graph import CONDITIONS, DERIVATIVES, Graph, Value, unsigned
 from .blocks import Writer
 from .c_code import Code
 from .guards import CostOf, Path, Plan, choices_in_blocks, common, paths

@@ -14,6 +14,7 @@ from itertools import groupby
 
 from ..expressions.expression import in_order
 from ..graph import algebraic
+from ..graph.coefficients import read_in_series, with_partials
 from ..graph.graph import (
     CONDITIONS,
     DERIVATIVES,
@@ -21,9 +22,7 @@ from ..graph.graph import (
     STEEP,
     Graph,
     Value,
-    read_in_series,
     unsigned,
-    with_partials,
 )
 from ..plain_c.values import Conditions
 from .blocks import Blocks
