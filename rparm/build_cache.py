@@ -184,7 +184,7 @@ def _in_tables(content: Any) -> Iterator[str]:
                 yield value
             if name == "components" and isinstance(value, dict):
                 yield from (each for each in value.values() if isinstance(each, str))
-            if name in ("include", "sources") and isinstance(value, list):
+            if name in ("include", "sources", "code") and isinstance(value, list):
                 yield from (each for each in value if isinstance(each, str))
             yield from _in_tables(value)
 

@@ -38,6 +38,7 @@ NUMBER, WHOLE, TEXT, EXPRESSION = ({"$ref": f"#/$defs/{name}"} for name in DEFIN
 IDENTIFIER = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}
 TERMINALS = {"type": "object", "propertyNames": IDENTIFIER}
 TERMINALS["additionalProperties"] = {"$ref": "#/$defs/terminal"}
+CODE = TEXT | {"pattern": f"^{reader.CODE.pattern}$"}
 ABOVE_0 = NUMBER | {"exclusiveMinimum": 0}
 TRUTH = {"type": "boolean"}
 WORD = {"type": "string", "pattern": NAME}
@@ -84,7 +85,7 @@ def schema() -> Schema:
     found = {key: {"description": about.get(key, key)} | properties[key] for key in reader.HEAD}
     some = [
         {"required": [section], "properties": {section: {"minProperties": 1}}}
-        for section in reader.SECTIONS
+        for section in (*reader.SECTIONS, "components")
     ]
     dialect = "https://json-schema.org/draft/2020-12/schema"
     definitions = DEFINITIONS | {"terminal": _terminal()}
@@ -127,7 +128,7 @@ def _further(named: Schema) -> dict[str, Schema]:
             "anyOf": [_by_name(modes, named), {"type": "array", "items": mode, "uniqueItems": True}]
         },
         "include": {"type": "array", "items": TEXT | {"pattern": f"^{INCLUDED.pattern}$"}},
-        "code": TEXT | {"pattern": f"^{reader.CODE.pattern}$"},
+        "code": {"anyOf": [CODE, {"type": "array", "items": CODE, "minItems": 1}]},
         "sizes": _by_name(size, named, has_indexes=False),
         "units": {"type": "object", "additionalProperties": unit},
         "tables": _by_name(_data(), of_functions, has_indexes=False),
@@ -137,7 +138,15 @@ def _further(named: Schema) -> dict[str, Schema]:
         "check": {"type": "object"} | check,
         "terminals": TERMINALS,
         "hook": _hook(),
+        "components": _components(),
+        "connections": {"type": "object"},
     }
+
+
+def _components() -> Schema:
+    file = TEXT | {"pattern": r"\.[tT][oO][mM][lL]$"}
+    entry = {"anyOf": [file, _table({"file": file, "parameters": {"type": "object"}}, "file")]}
+    return {"type": "object", "propertyNames": WORD, "additionalProperties": entry}
 
 
 def _hook() -> Schema:

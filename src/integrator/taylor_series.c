@@ -201,7 +201,8 @@ static bool is_continued(const struct taylor_series *series, double s) {
             way = (way + fabs(row[order])) * s;
         }
         const double found = series->end_row[rows->solutions[k]][0] - row[0];
-        if (!(fabs(found - expected) <= most_missed * way + 1e-12 * fabs(row[0]))) {
+        const bool is_read = isfinite(row[0]) != 0; // else the motion would not be finite, either
+        if (is_read && !(fabs(found - expected) <= most_missed * way + 1e-12 * fabs(row[0]))) {
             return false;
         }
     }

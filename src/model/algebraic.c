@@ -9,13 +9,12 @@ enum {
     MOST_ITERATIONS = 60,
     MOST_NEAR = 10,     /* iterations to a solution that is near */
     MOST_HALVINGS = 30, /* of a step */
-    PATIENCE = 12,      /* iterations after which a small step is enough */
     MOST_SHOWN = 120,   /* characters of names or equations in a message */
 };
 
 static const double noise = 4.0 * DBL_EPSILON; // of a residual, over the sizes of its terms
-static const double small_step = 1e-8;         // over the sizes of the unknowns
-static const double last_step = 1e-9;          // over the unknowns themselves
+static const double most_noise = 1e-11;        // of a step, over the unknowns themselves
+static const double least_noise = 1e-15;       // over the sizes of the unknowns
 static const double large_step = 1e-2;         // likewise
 /* Of the first step, within which there is one solution: Deuflhard, theorem 2.1. */
 static const double contraction = 0.25;
@@ -203,6 +202,20 @@ static void correct(const struct newton *newton, double step[]) {
     }
 }
 
+/* True if the step changes no unknown by more than a part of it. */
+static bool is_within(const struct newton *newton, const double unknown[], double part) {
+    bool found = true;
+    for (int i = 0; i < newton->system->count; i++) {
+        found &= fabs(newton->step[i]) <= part * fabs(unknown[i]);
+    }
+    return found;
+}
+
+/* True if rounding may hide whether a step leads nearer to the solution. */
+static bool is_small(const struct newton *newton, const double unknown[], double of_step) {
+    return is_within(newton, unknown, most_noise) || of_step <= least_noise;
+}
+
 /* Moves by a part of the step to `trial`, within the bounds. Returns how much of the step is left
  * there, by the matrix at its begin: 1 - part of linear equations. */
 static double left_after(const struct newton *newton, const double unknown[], double part,
@@ -224,6 +237,9 @@ static double left_after(const struct newton *newton, const double unknown[], do
 /* Moves to a trial by the whole step. Returns false unless it leads to the one solution that is
  * near. */
 static bool advance_near(const struct newton *newton, const double unknown[], double of_step) {
+    if (!(of_step <= 1.0)) {
+        return false;
+    }
     if (of_step > large_step) { // chance may lead to a solution that is far away
         const double half = left_after(newton, unknown, 0.5, of_step);
         if (!(fabs(half - 0.5) <= contraction)) {
@@ -231,7 +247,7 @@ static bool advance_near(const struct newton *newton, const double unknown[], do
         }
     }
     const double left = left_after(newton, unknown, 1.0, of_step);
-    return left <= contraction || (of_step <= small_step && left < INFINITY);
+    return left <= contraction || (left < INFINITY && is_small(newton, unknown, of_step));
 }
 
 /* Moves to a trial by as much of the step as leads nearer to a solution. Returns false if none
@@ -240,7 +256,7 @@ static bool advance_far(const struct newton *newton, const double unknown[], dou
     double part = 1.0;
     for (int count = 0; count <= MOST_HALVINGS; count++) {
         const double left = left_after(newton, unknown, part, of_step);
-        if (left <= 1.0 - 0.25 * part || (of_step <= small_step && left < INFINITY)) {
+        if (left <= 1.0 - 0.25 * part || (left < INFINITY && is_small(newton, unknown, of_step))) {
             return true;
         }
         part *= 0.5;
@@ -299,15 +315,6 @@ static bool begin_step(struct newton *newton, const double unknown[]) {
     return true;
 }
 
-/* True if the step changes no unknown by more than a part of it. */
-static bool is_within(const struct newton *newton, const double unknown[], double part) {
-    bool found = true;
-    for (int i = 0; i < newton->system->count; i++) {
-        found &= fabs(newton->step[i]) <= part * fabs(unknown[i]);
-    }
-    return found;
-}
-
 static enum algebraic_outcome iterate(struct newton *newton, bool is_near, double unknown[],
                                       int *iterations) {
     const int count = newton->system->count;
@@ -324,16 +331,17 @@ static enum algebraic_outcome iterate(struct newton *newton, bool is_near, doubl
         }
         const double of_step = length(newton, newton->step);
         if (is_within(newton, unknown, DBL_EPSILON) ||
-            (*iterations >= PATIENCE && of_step <= small_step)) {
+            (*iterations == MOST_ITERATIONS && of_step <= least_noise)) {
             return ALGEBRAIC_SOLVED;
         }
-        if (is_within(newton, unknown, last_step)) { // the digits double
+        const double shrinks = *iterations > 0 ? of_step / last : INFINITY;
+        if (is_within(newton, unknown, DBL_EPSILON / (shrinks * shrinks))) { // quadratically
             for (int i = 0; i < count; i++) {
                 unknown[i] += newton->step[i];
             }
             return ALGEBRAIC_SOLVED;
         }
-        if (*iterations > 0 && last <= small_step * 1e-4 && of_step > 0.5 * last) {
+        if (*iterations > 0 && of_step > 0.5 * last && is_small(newton, unknown, of_step)) {
             copy(count, newton->before, unknown); // from here on there is only noise
             return ALGEBRAIC_SOLVED;
         }

@@ -13,6 +13,7 @@ import fmpy
 import mpmath
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
@@ -489,3 +490,53 @@ def test_random_models_follow_scipy() -> None:
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         found = [text for text in pool.map(failure, range(COUNT)) if text]
     assert not found, "\n".join(found)
+
+
+UNTAKEN = """
+name = "Untaken"
+[states]
+x = { derivative = "1" }
+y = { derivative = "z if x > 2 else 0.5" }
+[algebraic]
+z = { start = 1, equation = "z**2 - (x - 1.5)" }
+"""
+ENDS = PROBLEMS["van_der_pol"]["text"].replace(", min = 1", "")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_block_in_a_branch_that_is_not_taken_needs_no_solution(
+    method: str, tmp_path: Path
+) -> None:
+    """It has none before x = 1.5."""
+    unit, _ = made(tmp_path, UNTAKEN)
+    end = run(unit, method, 1e-10, 4, 0.1, ["y"])[-1]
+    assert abs(end["y"] - (1 + (2.5**1.5 - 0.5**1.5) * 2 / 3)) < 1e-8
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_where_a_solution_ends_one_message_says_so(method: str, tmp_path: Path) -> None:
+    """At the fold of van der Pol's equation, t = 3/2 - log 2."""
+    messages: list[str] = []
+    unit, _ = made(tmp_path, ENDS)
+    with pytest.raises(FMICallException):
+        fmpy.simulate_fmu(
+            str(unit), stop_time=2, output_interval=2, relative_tolerance=1e-8,
+            start_values={"solver_method": METHODS[method]},
+            logger=lambda *said: messages.append(said[-1].decode()),
+        )  # fmt: skip
+    (said,) = [text for text in messages if "no solution" in text]
+    found = re.search(r"ended at ([\d.]+): y: no solution at t = [\d.]+, .* 0 = z - y", said)
+    assert found and abs(float(found[1]) - (1.5 - np.log(2))) < 1e-6
+
+
+def test_modes_that_contradict_each_other_end_the_run(tmp_path: Path) -> None:
+    text = 'name = "M"\n[states]\nx = { start = 4, derivative = "-1" }\n[where]\n'
+    text += 'a = "1 if b > 0 else -1"\nb = "x - 2 * a"\n'
+    messages: list[str] = []
+    unit, _ = made(tmp_path, text)
+    with pytest.raises(FMICallException):
+        fmpy.simulate_fmu(
+            str(unit), stop_time=4, logger=lambda *said: messages.append(said[-1].decode())
+        )
+    (said,) = [text for text in messages if "b > 0 of [where] a contradicts itself" in text]
+    assert abs(float(said.split()[3].rstrip(":")) - 2) < 1e-9

@@ -21,7 +21,7 @@ MODELS = tables(str(Path(__file__).with_name("algebraic")))
 def written(folder: Path, texts: Mapping[str, str], **changed: str) -> Path:
     """The file of the whole, beside its components."""
     for name, text in {**texts, **changed}.items():
-        suffix = {"c": "drive.c"}.get(name, f"{name}.toml")
+        suffix = {"c": "drive.c", "half": "half.c"}.get(name, f"{name}.toml")
         (folder / suffix).write_text(text, encoding="utf-8")
     return folder / "whole.toml"
 

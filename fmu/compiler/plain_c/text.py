@@ -185,13 +185,14 @@ def _joined(found: re.Match[str]) -> str:
 
 # ---- Parser --------------------------------------------------------------------------------------
 def read(
-    path: Path,
+    path: Path | Iterable[Path],
     folders: Iterable[Path] = (),
     made: Callable[[Path], str | None] = lambda _: None,
 ) -> Program:
-    """Read the declarations of a file, with includes from `folders`."""
+    """Read the declarations of a file, or of several as if they were one."""
     preprocessor = Preprocessor(made, folders)
-    preprocessor.add(path, path.name)
+    for each in [path] if isinstance(path, Path) else path:
+        preprocessor.add(each, each.name)
     return parsed("\n".join(preprocessor.lines), preprocessor.files)
 
 

@@ -6,7 +6,7 @@ of the graph, as if it stood in the expression. Every mistake is a ValueError, i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -74,12 +74,12 @@ class CodeFile:
     flat: dict[str, set[str]]  # functions without slope that a function calls
 
 
-def read(path: Path, made: Callable[[Path], str | None]) -> CodeFile:
-    """Read and check a C file: each function, as far as its arguments do not matter.
+def read(paths: Iterable[Path], made: Callable[[Path], str | None]) -> CodeFile:
+    """Read and check C files: each function, as far as its arguments do not matter.
 
     `made` gives headers that are made.
     """
-    program = read_c(path, made=made)
+    program = read_c(paths, made=made)
     graph = Graph(has_switches=False)
     calls = Calls(program, graph)
     own = {

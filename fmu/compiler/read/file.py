@@ -94,7 +94,7 @@ def read_tables(
         _read_table(file, name, entry)
     if "code" in head:
         with placed("code"):
-            file.code = read_code(path.parent / head["code"], header.made)
+            file.code = read_code([path.parent / name for name in head["code"]], header.made)
             file.header = header.Header(source)
             for name, function in file.code.functions.items():
                 if function.is_helper and name in keys.TAKEN:

@@ -102,8 +102,11 @@ def _merged(below: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
 def _moved(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return tables whose paths begin at another folder, from which `folder` leads to theirs."""
     found = dict(tables)
-    if isinstance(code := found.get("code"), str):
+    code = found.get("code")
+    if isinstance(code, str):
         found["code"] = (folder / code).as_posix()
+    elif isinstance(code, list) and all(isinstance(name, str) for name in code):
+        found["code"] = [(folder / name).as_posix() for name in code]
     if isinstance(data := found.get("tables"), dict):
         found["tables"] = {
             name: entry | {"file": (folder / entry["file"]).as_posix()}

@@ -171,6 +171,14 @@ def _arguments(value: Any) -> dict[str, str]:
     raise ValueError("expected a list of names, each once, or a table of their units")
 
 
+def _code(value: Any) -> list[str]:
+    """Return the C files, of which one need not be a list."""
+    names = value if isinstance(value, list) else [value]
+    if names and all(type(name) is str and CODE.fullmatch(name) for name in names):
+        return names
+    raise ValueError("expected a C file such as crane.c, or a list of them")
+
+
 READ = {
     **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
     "start": lambda given: given if type(given) in (bool, str) else finite_number(given),
@@ -188,7 +196,7 @@ READ = {
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
     "modes": _modes,
     "arguments": _arguments,
-    "code": _expect("a C file such as crane.c", str, CODE.fullmatch),
+    "code": _code,
     "field": _expect("a field of C such as damping[0]", str, FIELD.fullmatch),
     **dict.fromkeys(("sources", "indicators", "series"), LIST),
     "reads": _expect("a table", dict, lambda _: True),
