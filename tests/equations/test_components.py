@@ -226,3 +226,25 @@ left.h = 2.5
     (tmp_path / "back.py").write_text("def flow(t, h, inputs):\n    return {'q': 0.0}\n")
     ended = python(*RPARM, "system", path, "--exact", "--output", tmp_path / "r", "--json")
     assert ended.returncode == 2 and "only files with equations (.toml) can be" in ended.stderr
+
+
+def test_a_component_without_units_takes_any(tmp_path: Path) -> None:
+    """Its own numbers are not checked; x' = 2 y - x with y' = -y is x = (1 + 2 t) exp(-t)."""
+    part = 'name = "A"\n[inputs]\nu = {}\n[states]\nx = { start = 1, derivative = "u - x" }\n'
+    (tmp_path / "a.toml").write_text(part)
+    (tmp_path / "whole.toml").write_text("""
+name = "Whole"
+[components]
+a = "a.toml"
+[connections]
+a.u = "2 * y"
+[parameters]
+T = { start = 1, unit = "s" }
+[states]
+y = { start = 1, unit = "m", derivative = "-y / T" }
+[outputs]
+s = { value = "a.x + y", unit = "m" }
+""")
+    rows = run(quick(tmp_path / "whole.toml", tmp_path), "erk", 1, ["a.x", "s"])
+    assert abs(rows["a.x"][-1] - 3 * np.exp(-1)) < 1e-10
+    assert abs(rows["s"][-1] - 4 * np.exp(-1)) < 1e-10

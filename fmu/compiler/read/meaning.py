@@ -244,7 +244,7 @@ def _check_units(file: ModelFile) -> None:
         if variable.expression.is_checked:
             continue
         with placed("[where]", variable.name):
-            variable.exponents = _whole(units[variable.name])
+            variable.exponents = _whole(units[variable.name] or dimensions.ONE)
 
 
 def _add_units(file: ModelFile, block: Block, units: dict[str, Dimension | None]) -> None:
