@@ -112,7 +112,7 @@ void instance_settle(double t, const double x[], void *instance_pointer) {
     const struct model *model = instance->model;
     char *values = instance->memory.restart_values;
     evaluate_inputs(instance, t);
-    model->anchor(values, instance->state.restart_time.s + t, x, instance->u, true,
+    model->anchor(values, instance->state.restart_time.s + t, x, instance->u, SEARCH_NEAR,
                   doubles_of(values, model->anchors));
 }
 

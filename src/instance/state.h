@@ -172,13 +172,17 @@ static inline double instance_next_time(const struct instance *instance) {
                                                        : INFINITY;
 }
 
-/* Lets the searches for solutions of equations begin at those of the present values. */
+/* Lets the searches for solutions of equations begin at those of the present values; where present
+ * modes have none, at those in other modes. */
 static inline void instance_move_anchors(struct instance *instance) {
     const struct model *model = instance->model;
     if (model->anchor != NULL) {
         char *values = instance->memory.values;
-        model->anchor(values, instance->state.time.s, doubles_of(values, model->states),
-                      doubles_of(values, model->inputs), false, doubles_of(values, model->anchors));
+        for (enum model_search search = SEARCH_FREE; search >= SEARCH_FAR; search--) {
+            model->anchor(values, instance->state.time.s, doubles_of(values, model->states),
+                          doubles_of(values, model->inputs), search,
+                          doubles_of(values, model->anchors));
+        }
         instance->outputs_are_valid = false;
     }
 }

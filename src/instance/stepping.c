@@ -27,7 +27,9 @@ struct step {
     struct event_counts events; /* events so far */
     int64_t steps_before;       /* internal steps from initialization to the begin of the step */
     bool has_message;           /* true if a message has explained the failure */
-    bool is_stuck;              /* true if the integrator has failed */
+    bool has_touched;           /* true if a mode has ended at the time `touched` */
+    struct clock_time touched;
+    bool is_stuck; /* true if the integrator has failed */
 };
 
 /* ---- Times ---------------------------------------------------------------------------------- */
@@ -276,6 +278,21 @@ static bool is_at_rest(const struct instance *instance) {
                                                  events->is_at_rest(instance->memory.values));
 }
 
+/* True if the advance has ended where a mode has no solution beyond its limit: that is an event,
+ * once at any time. */
+static bool ends_at_limit(struct step *step) {
+    const struct instance_state *state = &step->instance->state;
+    const struct clock_time now = clock_add(state->restart_time, state->latest_time);
+    const bool is_again = step->has_touched && clock_difference(now, step->touched) == 0.0;
+    step->has_touched = true;
+    step->touched = now;
+    if (is_again || !integrator_touches(step->instance->integrator)) {
+        return false;
+    }
+    step->triggered = integrator_event(step->instance->integrator);
+    return true;
+}
+
 /* Advances by the restarts that anchors need. */
 static enum status advance_by_restarts(struct step *step) {
     struct instance *instance = step->instance;
@@ -284,9 +301,11 @@ static enum status advance_by_restarts(struct step *step) {
         const enum status status =
             step->options->accept == NULL ? advance(step) : advance_observed(step);
         const bool may_be_lost = status == STATUS_NOT_FINITE || status == STATUS_NO_CONVERGENCE;
-        if (!may_be_lost || instance->model->anchor == NULL || state->latest_time <= 0.0 ||
-            steps_left(step) <= 0) {
+        if (!may_be_lost || !instance->ode.may_end || steps_left(step) <= 0) {
             return status;
+        }
+        if (instance->model->anchor == NULL || state->latest_time <= 0.0) {
+            return ends_at_limit(step) ? STATUS_OK : status;
         }
         instance_note_part(instance, status, false); // moves the instance there
         move_inputs(instance, clock_difference(state->time, step->begin));

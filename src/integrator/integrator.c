@@ -253,6 +253,11 @@ const bool *integrator_event(const struct integrator *integrator) {
     return location->time == integrator->problem.reached ? location->triggered : NULL;
 }
 
+bool integrator_touches(struct integrator *integrator) {
+    struct problem *problem = &integrator->problem;
+    return location_touch(&problem->location, problem->reached, integrator->reached_x);
+}
+
 void integrator_set_observer(struct integrator *integrator, integrator_observer *observer,
                              void *context) {
     integrator->problem.observer = observer;

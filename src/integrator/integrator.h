@@ -92,6 +92,10 @@ MUST_CHECK NONNULL enum status integrator_rest(struct integrator *integrator, co
  * NULL. After an event the next call must be a restart. */
 NONNULL const bool *integrator_event(const struct integrator *integrator);
 
+/* True if indicators are at 0, within their errors, where an advance has failed: a mode may have no
+ * solution beyond its limit. Then that is an event, as of integrator_event. */
+NONNULL bool integrator_touches(struct integrator *integrator);
+
 /* Returns the state at which the equations were last found not finite since the restart, and
  * writes its time (s since the restart); NULL if there is none. */
 NONNULL const double *integrator_failure(const struct integrator *integrator, double *t);

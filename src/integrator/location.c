@@ -544,7 +544,7 @@ static double search_polynomials(struct location *location) {
     return s;
 }
 
-enum status location_search(struct location *location) {
+static enum status search_step(struct location *location) {
     const struct step_polynomial *step = &location->step;
     bool needs_search = false;
     bool needs_model = false;
@@ -584,14 +584,15 @@ enum status location_search(struct location *location) {
     return STATUS_OK;
 }
 
-enum status location_try(struct location *location) {
+/* Searches a step; takes the search back if it fails or, unless it is `final`, finds no event. */
+static enum status attempt(struct location *location, bool is_final) {
     const struct location before = *location;
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         location->kept[i] = (struct location_kept){location->is_armed[i], location->noise[i],
                                                    location->samples[i][0]};
     }
-    const enum status status = location_search(location);
-    if (status != STATUS_OK || location->time == INFINITY) {
+    const enum status status = search_step(location);
+    if (status != STATUS_OK || (!is_final && location->time == INFINITY)) {
         *location = before;
         for (size_t i = 0; i < location->ode->indicator_count; i++) {
             location->is_armed[i] = location->kept[i].is_armed;
@@ -600,6 +601,30 @@ enum status location_try(struct location *location) {
         }
     }
     return status;
+}
+
+enum status location_search(struct location *location) {
+    return location->ode->may_end ? attempt(location, true) : search_step(location);
+}
+
+enum status location_try(struct location *location) {
+    return attempt(location, false);
+}
+
+bool location_touch(struct location *location, double t, const double x[]) {
+    bool is_any = false;
+    if (!location_is_active(location) || evaluate(location, t, x) != STATUS_OK) {
+        return false;
+    }
+    memset(location->triggered, 0, location->ode->indicator_count * sizeof *location->triggered);
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        location->triggered[i] = location->indicators[i].kind == INDICATOR_OF_MODEL &&
+                                 location->z[i] <= larger(location->error[i], location->touch[i]);
+        is_any |= location->triggered[i];
+    }
+    location->time = is_any ? t : INFINITY;
+    return is_any;
 }
 
 enum status location_search_at_rest(struct location *location, const double x[], double t) {

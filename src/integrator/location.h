@@ -90,6 +90,10 @@ MUST_CHECK NONNULL enum status location_search(struct location *location);
 /* Does the same if the step has an event; if not, or on failure, it leaves no trace. */
 MUST_CHECK NONNULL enum status location_try(struct location *location);
 
+/* True if indicators of the model are at 0 within their errors, at t and x. Writes t as the time of
+ * an event, and which. */
+MUST_CHECK NONNULL bool location_touch(struct location *location, double t, const double x[]);
+
 /* Searches the time from 0 to t, over which the states stay at x. */
 MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],
                                                        double t);

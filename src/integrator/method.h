@@ -5,6 +5,8 @@
 
 #include "location.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 /* ---- The problem ---------------------------------------------------------------------------- */
@@ -75,12 +77,14 @@ static inline void problem_settle(struct problem *problem, double t, const doubl
 }
 
 /* Distance from the end of a solution that is as good as none, over the time since the restart. */
-#define PROBLEM_END 1e-10
+#define PROBLEM_END 1e-12
 
 /* True if a solution that is known at `begin` and unknown at t ends so near that the end has been
  * found. */
 static inline bool problem_has_ended(const struct problem *problem, double begin, double t) {
-    return problem->ode.may_end && t >= begin && t - begin <= PROBLEM_END * begin;
+    const double nearest =
+        fmax(PROBLEM_END * begin, 4.0 * DBL_EPSILON * fabs(problem->origin + begin));
+    return problem->ode.may_end && t >= begin && t - begin <= nearest;
 }
 
 /* True if the method is stuck in front of a time at which the right-hand side cannot be evaluated.

@@ -376,6 +376,9 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
         if (flag >= 0 && location_is_active(&problem->location) && internal > before) {
             cvode->search_status = search(cvode, before, internal);
             if (cvode->search_status != STATUS_OK) {
+                (void)problem_fail(problem, internal, x);
+                *stopped_at = before;
+                evaluate_history(cvode, before, x);
                 return CV_UNREC_RHSFUNC_ERR;
             }
             if (problem->location.time <= t) {

@@ -86,6 +86,11 @@ static void search(struct erk *erk, double t, const double x[],
     erk->is_cut_short = erk->search_status != STATUS_OK || location->time <= erk->end;
 }
 
+/* True if the begin of each internal step is kept: to search it, or to go back to it. */
+static bool keeps_begins(const struct problem *problem) {
+    return location_is_active(&problem->location) || problem->ode.settle != NULL;
+}
+
 /* Evaluates the right-hand side of an advance that is watched: it is known at the begin of an
  * internal step and perhaps at the second stage, and behind the last step nothing needs it. */
 static int watched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
@@ -116,13 +121,15 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
         return 0;
     }
     erk->watched = t;
-    if (location_is_active(&problem->location)) {
+    if (keeps_begins(problem)) {
         if (t == erk->last_t) { // the last stage is at the end of the step
             memcpy(erk->dx, erk->last_dx, problem->ode.state_count * sizeof(double));
         } else {
             erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
         }
-        search(erk, t, small_vector_data(x), location_search);
+        if (location_is_active(&problem->location)) {
+            search(erk, t, small_vector_data(x), location_search);
+        }
         if (!erk->is_cut_short) {
             const size_t size = problem->ode.state_count * sizeof(double);
             erk->step_begin = t;
@@ -136,6 +143,12 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
     if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
         erk->is_cut_short = problem_ask_observer(problem, t, small_vector_data(x));
     }
+    if (erk->search_status != STATUS_OK) { // back to where the step began
+        (void)problem_fail(erk->base.problem, t, small_vector_data(x));
+        erk->watched = erk->step_begin;
+        memcpy(erk->cut_x, erk->step_x, problem->ode.state_count * sizeof(double));
+        return ERKStepSetStopTime(erk->solver, t);
+    }
     if (erk->is_cut_short) {
         memcpy(erk->cut_x, small_vector_data(x), problem->ode.state_count * sizeof(double));
         return ERKStepSetStopTime(erk->solver, t);
@@ -147,7 +160,7 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
  * x. */
 static int begin_watching(struct erk *erk, double end, const double begin_x[], double x[]) {
     struct problem *problem = erk->base.problem;
-    const bool is_searched = location_is_active(&problem->location);
+    const bool keeps = keeps_begins(problem);
     erk->is_cut_short = false;
     erk->cut_x = x;
     erk->end = end;
@@ -156,15 +169,15 @@ static int begin_watching(struct erk *erk, double end, const double begin_x[], d
     erk->step_begin = NAN;
     erk->second_t = NAN;
     erk->last_t = NAN;
-    if (is_searched) {
+    if (keeps) {
         memcpy(erk->step_x, begin_x, problem->ode.state_count * sizeof(double));
         if (problem_rhs(problem, problem->reached, begin_x, erk->step_dx) != STATUS_OK) {
             return ARK_RHSFUNC_FAIL;
         }
         erk->step_begin = problem->reached;
     }
-    const bool is_watched = is_searched || problem->observer != NULL || problem->ode.settle != NULL;
-    return ERKStepSetPostprocessStepFn(erk->solver, is_watched ? observe : NULL);
+    return ERKStepSetPostprocessStepFn(erk->solver,
+                                       keeps || problem->observer != NULL ? observe : NULL);
 }
 
 /* ---- Life ----------------------------------------------------------------------------------- */
@@ -245,7 +258,7 @@ static enum status restart(void *memory, const double x[]) {
  */
 static int start(struct erk *erk, double begin, double end, double first_step) {
     const struct problem *problem = erk->base.problem;
-    const bool is_watched = location_is_active(&problem->location) || problem->observer != NULL;
+    const bool is_watched = keeps_begins(problem) || problem->observer != NULL;
     int flag =
         ERKStepReInit(erk->solver, is_watched ? watched_rhs : sundials_rhs, begin, erk->base.x);
     if (flag == ARK_SUCCESS) {
@@ -415,10 +428,11 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
             break;
         }
         flag = ERKStepEvolve(erk->solver, end, erk->base.x, stopped_at, ARK_ONE_STEP);
-        if (erk->is_cut_short) {
+        const bool is_unsearched = erk->search_status != STATUS_OK;
+        if (erk->is_cut_short && !is_unsearched) {
             break;
         }
-        if (flag >= 0) {
+        if (flag >= 0 && !is_unsearched) {
             good = *stopped_at;
             sundials_get_state(&erk->base, x);
             (void)ERKStepGetCurrentStep(erk->solver, &step);
@@ -429,6 +443,8 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
             break;
         }
         add_work(erk, work);
+        erk->is_cut_short = false;
+        erk->search_status = STATUS_OK;
         sundials_set_state(&erk->base, x);
         flag = start(erk, good, end, step);
     }
@@ -481,7 +497,7 @@ static bool correct_time(const struct location *location, double t, const double
 /* Steps onto the event. The polynomial of the search is less accurate than the step: Newton's
  * method leads from its root to the root of the steps that end there. The indicator may be 0 at the
  * begin of the step, too: a correction that leads out of the part with the fall divides this part
- * in two. */
+ * in two. On failure the advance is back where the step began. */
 static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
     struct location *location = &erk->base.problem->location;
     double low = erk->step_begin;
@@ -527,23 +543,13 @@ static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
             divisions++;
         }
     }
-    location->time = t;
+    if (flag < 0) {
+        memcpy(x, erk->step_x, erk->base.problem->ode.state_count * sizeof *x);
+        t = erk->step_begin;
+    }
+    location->time = flag < 0 ? INFINITY : t;
     *stopped_at = t;
     return flag;
-}
-
-/* The first message of an advance, which is sent if the advance fails in the end. */
-struct kept_message {
-    enum status status;
-    char text[512];
-};
-
-static void keep_message(void *kept_pointer, enum status status, const char *text) {
-    struct kept_message *kept = kept_pointer;
-    if (kept->text[0] == '\0') {
-        kept->status = status;
-        (void)snprintf(kept->text, sizeof kept->text, "%s", text);
-    }
 }
 
 /* Integrates with ERKStep. watching: the flag of begin_watching. */
@@ -554,9 +560,10 @@ static int integrate(struct erk *erk, int watching, double t, int64_t max_steps,
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
     const double first_step = erk->next_step > 0.0 ? length / ceil(length / erk->next_step) : 0.0;
-    struct kept_message kept = {.text = ""};
+    struct sundials_message kept = {.text = ""};
     const struct message_sink sink = erk->base.problem->sink;
-    erk->base.problem->sink = (struct message_sink){.write = keep_message, .context = &kept};
+    erk->base.problem->sink =
+        (struct message_sink){.write = sundials_keep_message, .context = &kept};
     sundials_set_state(&erk->base, begin_x);
     int flag = start(erk, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
@@ -568,10 +575,14 @@ static int integrate(struct erk *erk, int watching, double t, int64_t max_steps,
     if (flag == ARK_SUCCESS) {
         flag = ERKStepEvolve(erk->solver, t, erk->base.x, stopped_at, ARK_NORMAL);
     }
-    const bool is_given_up = flag < 0 && flag != ARK_TOO_MUCH_WORK && !erk->is_cut_short;
+    const bool is_given_up = erk->search_status != STATUS_OK ||
+                             (flag < 0 && flag != ARK_TOO_MUCH_WORK && !erk->is_cut_short);
     if (is_given_up) {
         add_work(erk, work);
-        flag = advance_carefully(erk, begin, t, max_steps, begin_x, stopped_at, x, work);
+        // what has settled cannot be taken back
+        const bool has_moved = erk->base.problem->ode.settle != NULL && isfinite(erk->step_begin);
+        flag = advance_carefully(erk, has_moved ? erk->step_begin : begin, t, max_steps,
+                                 has_moved ? erk->step_x : begin_x, stopped_at, x, work);
     } else if (!erk->is_cut_short) {
         sundials_get_state(&erk->base, x);
     }

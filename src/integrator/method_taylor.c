@@ -33,6 +33,7 @@ struct taylor {
     struct taylor_series series;
     bool is_searched;     /* true if events are searched since the restart */
     double longest_scale; /* largest time scale of the next step of the running advance, s */
+    double longest;       /* of the next step, s: less than a step in which a solution was lost */
     double last_length; /* length of the last step, or the one given by a restart, s; 0 if there is
                            none */
     double *end_x;      /* the state at the end of the last step */
@@ -156,14 +157,15 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
 /* Returns the longest step from the time t on, s. */
-static double longest_step(const struct problem *problem, double t) {
+static double longest_step(const struct taylor *taylor, double t) {
+    const struct problem *problem = taylor->series.problem;
     const double max_step = problem->settings.max_step;
-    const double left = problem->horizon - t;
+    const double left = fmin(problem->horizon - t, taylor->longest);
     return max_step > 0.0 && max_step < left ? max_step : left;
 }
 
 static double longest_step_in_scales(const struct taylor *taylor, double t, double time_scale) {
-    const double longest = longest_step(taylor->series.problem, t) / time_scale;
+    const double longest = longest_step(taylor, t) / time_scale;
     const bool is_free =
         taylor->series.is_event_near && !taylor->series.problem->location.needs_model;
     const double grown = is_free ? most_after_event : growing;
@@ -234,7 +236,7 @@ static const double first_length = 1e-3;
 /* Returns the length for which a step from `now` towards t is expanded, s. With events, long steps
  * must not depend on t: then it is the length of the step before. */
 static double length_to_expand(const struct taylor *taylor, double now, double t, bool is_long) {
-    const double longest = longest_step(taylor->series.problem, now);
+    const double longest = longest_step(taylor, now);
     if (is_long && taylor->is_searched) {
         // events may follow each other so closely that the length underflows
         const double last = taylor->last_length >= DBL_MIN ? taylor->last_length : first_length;
@@ -270,6 +272,10 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     *end = lands ? t : now + step * series->time_scale;
     if (!(*end > now)) {
         return STATUS_NO_CONVERGENCE;
+    }
+    const bool is_cut = *end < t && *end - now < 0.5 * longest_step(taylor, now);
+    if (is_cut && problem_has_ended(series->problem, now, *end)) { // steps creep up to an edge
+        return problem_fail(series->problem, *end, taylor->end_x);
     }
     if (*end > t) {
         taylor_series_evaluate(series, (t - now) / series->time_scale, x, NULL);
@@ -337,6 +343,16 @@ static double begin_advance(struct taylor *taylor, const double begin_x[], doubl
     return begin;
 }
 
+/* Goes back to the begin of a step in which a solution is lost. Returns false if no shorter step
+ * can be tried. */
+static bool can_be_shorter(struct taylor *taylor, double begin, double end, double x[]) {
+    struct problem *problem = taylor->series.problem;
+    (void)problem_fail(problem, end, taylor->end_x);
+    taylor_series_evaluate(&taylor->series, 0.0, x, NULL);
+    taylor->longest = 0.5 * (end - begin);
+    return begin + taylor->longest > begin && !problem_has_ended(problem, begin, end);
+}
+
 /* Takes steps until t or an event. is_long: of the first step. */
 static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps, bool is_long,
                               const double begin_x[], double *stopped_at, double x[],
@@ -346,6 +362,7 @@ static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps
     const bool is_searched = taylor->is_searched;
     *stopped_at = begin_advance(taylor, begin_x, x);
     work->internal = *stopped_at;
+    taylor->longest = INFINITY;
     while (*stopped_at < t) {
         if (work->steps == max_steps) {
             message_write(&problem->sink, STATUS_TOO_MANY_STEPS,
@@ -358,10 +375,17 @@ static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps
         enum status status = take_step(taylor, *stopped_at, t, is_long, x, &end, work);
         if (status == STATUS_OK && is_searched) {
             status = search(taylor, end);
+            if (status == STATUS_NOT_FINITE && can_be_shorter(taylor, *stopped_at, end, x)) {
+                work->internal = *stopped_at;
+                work->failed_steps++;
+                work->steps--;
+                continue;
+            }
         }
         if (status != STATUS_OK) {
             return status;
         }
+        taylor->longest = INFINITY;
         if (is_searched && problem->location.time <= t) {
             taylor->passed = end;
             *stopped_at = problem->location.time;

@@ -163,6 +163,14 @@ int sundials_callback_flag(enum status status) {
     return status == STATUS_OK ? 0 : 1;
 }
 
+void sundials_keep_message(void *kept, enum status status, const char *text) {
+    struct sundials_message *message = kept;
+    if (message->text[0] == '\0') {
+        message->status = status;
+        (void)snprintf(message->text, sizeof message->text, "%s", text);
+    }
+}
+
 long sundials_steps(int64_t count) {
     return count < LONG_MAX ? (long)count : LONG_MAX;
 }

@@ -48,6 +48,16 @@ int sundials_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data);
 /* Returns the flag of a callback: 1 if the evaluation failed, so that a smaller step is tried. */
 int sundials_callback_flag(enum status status);
 
+/* The first message of an advance, which is sent if the advance fails in the end; text: "" if there
+ * is none yet. */
+struct sundials_message {
+    enum status status;
+    char text[512];
+};
+
+/* Keeps a message unless there is one; a message_sink's write. */
+void sundials_keep_message(void *kept, enum status status, const char *text);
+
 /* Converts a number of steps to a long, which has 32 bits on some platforms. */
 long sundials_steps(int64_t count);
 

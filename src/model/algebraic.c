@@ -6,10 +6,10 @@
 #include <string.h>
 
 enum {
-    MOST_ITERATIONS = 60,
-    MOST_NEAR = 10,     /* iterations to a solution that is near */
-    MOST_HALVINGS = 30, /* of a step */
-    MOST_SHOWN = 120,   /* characters of names or equations in a message */
+    MOST_ITERATIONS = 200, /* to an edge they halve the distance at best */
+    MOST_NEAR = 10,        /* iterations to a solution that is near */
+    MOST_HALVINGS = 30,    /* of a step */
+    MOST_SHOWN = 120,      /* characters of names or equations in a message */
 };
 
 static const double noise = 4.0 * DBL_EPSILON; // of a residual, over the sizes of its terms
@@ -18,6 +18,9 @@ static const double least_noise = 1e-15;       // over the sizes of the unknowns
 static const double large_step = 1e-2;         // likewise
 /* Of the first step, within which there is one solution: Deuflhard, theorem 2.1. */
 static const double contraction = 0.25;
+static const double off_edge = 0x1p-10; // over the size of an unknown
+static const double straight = 1e-6;    // change of a step by that of the slopes, over the step
+static const double jump = 1e-6; // of a residual whose sign changes, over its values at the bounds
 
 /* ---- Linear equations ----------------------------------------------------------------------- */
 
@@ -140,6 +143,7 @@ void algebraic_bounds(int count, const double matrix[], const int pivot[], const
 struct newton {
     const struct algebraic *system;
     const double *given;
+    bool is_free;
     double *matrix, *next; /* slopes at the last iterate, factorized, and at the next one */
     double *residual, *step, *ahead, *trial, *size, *before;
     int *pivot;
@@ -160,14 +164,23 @@ static void copy(int count, const double from[], double to[]) {
 }
 
 /* Writes the residuals and their slopes to newton->residual and newton->next. Returns false if the
- * residuals are not finite. */
+ * residuals are not finite or, where one is not 0, if the slopes are not. */
 static bool evaluate(const struct newton *newton, const double unknown[]) {
     const int count = newton->system->count;
+    double size = 0.0;
+    double sum = 0.0;
     for (int i = 0; i < count * count; i++) {
         newton->next[i] = 0.0;
     }
-    newton->system->evaluate(newton->given, unknown, newton->residual, newton->next);
-    return are_finite(count, newton->residual);
+    newton->system->evaluate(newton->given, newton->is_free, unknown, newton->residual,
+                             newton->next);
+    for (int i = 0; i < count; i++) {
+        size += fabs(newton->residual[i]);
+    }
+    for (int i = 0; size > 0.0 && i < count * count; i++) {
+        sum += 0.0 * newton->next[i];
+    }
+    return isfinite(size) && sum == 0.0;
 }
 
 /* True if each residual is as small as the rounding of its terms. */
@@ -179,7 +192,7 @@ static bool is_rounding(const struct newton *newton, const double unknown[]) {
         for (int j = 0; j < count; j++) {
             size += fabs(newton->next[i * count + j] * unknown[j]);
         }
-        found = fabs(newton->residual[i]) <= noise * size;
+        found = newton->residual[i] == 0.0 || fabs(newton->residual[i]) <= noise * size;
     }
     return found;
 }
@@ -216,6 +229,16 @@ static bool is_small(const struct newton *newton, const double unknown[], double
     return is_within(newton, unknown, most_noise) || of_step <= least_noise;
 }
 
+/* True if the slopes have not changed over the last step: what is left is rounding, or a long way,
+ * and no edge where slopes have no limit. */
+static bool goes_straight(const struct newton *newton) {
+    double change = 0.0;
+    for (int i = 0; i < newton->system->count; i++) {
+        change = fmax(change, fabs(newton->step[i] - newton->ahead[i]) / newton->size[i]);
+    }
+    return change <= straight * length(newton, newton->step);
+}
+
 /* Moves by a part of the step to `trial`, within the bounds. Returns how much of the step is left
  * there, by the matrix at its begin: 1 - part of linear equations. */
 static double left_after(const struct newton *newton, const double unknown[], double part,
@@ -250,18 +273,21 @@ static bool advance_near(const struct newton *newton, const double unknown[], do
     return left <= contraction || (left < INFINITY && is_small(newton, unknown, of_step));
 }
 
-/* Moves to a trial by as much of the step as leads nearer to a solution. Returns false if none
- * does. */
-static bool advance_far(const struct newton *newton, const double unknown[], double of_step) {
+/* Moves to a trial by as much of the step as leads nearer to a solution, and writes whether that is
+ * all of it. Returns false if no part does. */
+static bool advance_far(const struct newton *newton, const double unknown[], double of_step,
+                        bool *is_whole) {
     double part = 1.0;
     for (int count = 0; count <= MOST_HALVINGS; count++) {
-        const double left = left_after(newton, unknown, part, of_step);
-        if (left <= 1.0 - 0.25 * part || (left < INFINITY && is_small(newton, unknown, of_step))) {
+        if (left_after(newton, unknown, part, of_step) <= 1.0 - 0.25 * part) {
+            *is_whole = count == 0;
             return true;
         }
         part *= 0.5;
     }
-    return false;
+    *is_whole = true;
+    return is_small(newton, unknown, of_step) &&
+           left_after(newton, unknown, 1.0, of_step) < INFINITY;
 }
 
 /* Solves a single equation between its bounds, at which the residual has opposite signs. Returns
@@ -275,15 +301,16 @@ static bool bisect(const struct newton *newton, double unknown[]) {
     }
     double at_low;
     double at_high;
-    system->evaluate(newton->given, &low, &at_low, NULL);
-    system->evaluate(newton->given, &high, &at_high, NULL);
+    system->evaluate(newton->given, newton->is_free, &low, &at_low, NULL);
+    system->evaluate(newton->given, newton->is_free, &high, &at_high, NULL);
+    const double at_bounds = fmax(fabs(at_low), fabs(at_high));
     if (!((at_low <= 0.0 && at_high >= 0.0) || (at_low >= 0.0 && at_high <= 0.0))) {
         return false;
     }
     double middle = 0.5 * low + 0.5 * high;
     while (middle > low && middle < high) {
         double value;
-        system->evaluate(newton->given, &middle, &value, NULL);
+        system->evaluate(newton->given, newton->is_free, &middle, &value, NULL);
         if (isnan(value)) {
             return false;
         }
@@ -292,10 +319,14 @@ static bool bisect(const struct newton *newton, double unknown[]) {
         middle = 0.5 * low + 0.5 * high;
     }
     double of_low;
-    system->evaluate(newton->given, &low, &of_low, NULL);
-    system->evaluate(newton->given, &high, &at_high, NULL);
+    system->evaluate(newton->given, newton->is_free, &low, &of_low, NULL);
+    system->evaluate(newton->given, newton->is_free, &high, &at_high, NULL);
+    const double least = fmin(fabs(of_low), fabs(at_high));
+    if (!(least <= jump * at_bounds)) { // signs also change at a pole, or where values jump
+        return false;
+    }
     unknown[0] = fabs(of_low) < fabs(at_high) ? low : high;
-    system->evaluate(newton->given, unknown, newton->residual, NULL);
+    newton->residual[0] = least;
     return true;
 }
 
@@ -315,11 +346,29 @@ static bool begin_step(struct newton *newton, const double unknown[]) {
     return true;
 }
 
+/* Moves a guess away from where the equations or their slopes are not finite, as at the edge of a
+ * root, by a small part of the sizes. Returns false if that does not help. */
+static bool leave_edge(const struct newton *newton, double unknown[]) {
+    const struct algebraic *system = newton->system;
+    copy(system->count, unknown, newton->trial);
+    for (int sign = 1; sign >= -1; sign -= 2) {
+        for (int i = 0; i < system->count; i++) {
+            unknown[i] = newton->trial[i] + sign * off_edge * system->nominal[i];
+        }
+        if (evaluate(newton, unknown)) {
+            return true;
+        }
+    }
+    copy(system->count, newton->trial, unknown);
+    return false;
+}
+
 static enum algebraic_outcome iterate(struct newton *newton, bool is_near, double unknown[],
                                       int *iterations) {
     const int count = newton->system->count;
     double last = INFINITY; // length of the step to this iterate
-    if (!evaluate(newton, unknown)) {
+    bool is_whole = true;   // that step; where parts lead ever nearer to an edge is no solution
+    if (!evaluate(newton, unknown) && (is_near || !leave_edge(newton, unknown))) {
         return ALGEBRAIC_NOT_FINITE;
     }
     for (*iterations = 0;; ++*iterations) {
@@ -330,8 +379,9 @@ static enum algebraic_outcome iterate(struct newton *newton, bool is_near, doubl
             return ALGEBRAIC_SINGULAR;
         }
         const double of_step = length(newton, newton->step);
+        const bool is_straight = *iterations > 0 && is_whole && goes_straight(newton);
         if (is_within(newton, unknown, DBL_EPSILON) ||
-            (*iterations == MOST_ITERATIONS && of_step <= least_noise)) {
+            (*iterations == MOST_ITERATIONS && is_straight && of_step <= least_noise)) {
             return ALGEBRAIC_SOLVED;
         }
         const double shrinks = *iterations > 0 ? of_step / last : INFINITY;
@@ -341,7 +391,7 @@ static enum algebraic_outcome iterate(struct newton *newton, bool is_near, doubl
             }
             return ALGEBRAIC_SOLVED;
         }
-        if (*iterations > 0 && of_step > 0.5 * last && is_small(newton, unknown, of_step)) {
+        if (is_straight && of_step > 0.5 * last && is_small(newton, unknown, of_step)) {
             copy(count, newton->before, unknown); // from here on there is only noise
             return ALGEBRAIC_SOLVED;
         }
@@ -349,7 +399,7 @@ static enum algebraic_outcome iterate(struct newton *newton, bool is_near, doubl
         last = of_step;
         if (*iterations == (is_near ? MOST_NEAR : MOST_ITERATIONS) ||
             !(is_near ? advance_near(newton, unknown, of_step)
-                      : advance_far(newton, unknown, of_step))) {
+                      : advance_far(newton, unknown, of_step, &is_whole))) {
             return ALGEBRAIC_FAR;
         }
         copy(count, newton->trial, unknown);
@@ -357,11 +407,13 @@ static enum algebraic_outcome iterate(struct newton *newton, bool is_near, doubl
 }
 
 struct algebraic_report algebraic_solve(const struct algebraic *system, struct algebraic_room room,
-                                        const double given[], bool is_near, double unknown[]) {
+                                        const double given[], bool is_near, bool is_free,
+                                        double unknown[]) {
     const int count = system->count;
     struct newton newton = {
         .system = system,
         .given = given,
+        .is_free = is_free && system->has_modes,
         .matrix = room.matrix,
         .next = room.matrix + (ptrdiff_t)count * (count + 1),
         .residual = room.vector,
@@ -374,8 +426,19 @@ struct algebraic_report algebraic_solve(const struct algebraic *system, struct a
     };
     struct algebraic_report report = {.iterations = 0};
     report.outcome = iterate(&newton, is_near, unknown, &report.iterations);
+    if (report.outcome == ALGEBRAIC_NOT_FINITE && system->has_modes && !is_free) {
+        newton.is_free = true;
+        report.outcome = iterate(&newton, false, unknown, &report.iterations);
+        newton.is_free = false;
+        if (report.outcome == ALGEBRAIC_SOLVED) {
+            report.outcome = iterate(&newton, is_near, unknown, &report.iterations);
+        }
+    }
     if (report.outcome != ALGEBRAIC_SOLVED && bisect(&newton, unknown)) {
         report.outcome = ALGEBRAIC_SOLVED;
+    }
+    if (report.outcome != ALGEBRAIC_SOLVED) {
+        (void)evaluate(&newton, unknown);
     }
     for (int i = 0; i < count; i++) {
         report.residual = fmax(report.residual, fabs(newton.residual[i]));
@@ -388,7 +451,7 @@ void algebraic_spread(const struct algebraic *system, struct algebraic_room room
                       const double given[], const double unknown[], double error[]) {
     const int count = system->count;
     double *e = room.vector;
-    system->evaluate(given, unknown, e, room.matrix); // the room is 0 for a start
+    system->evaluate(given, false, unknown, e, room.matrix); // the room is 0 for a start
     for (int i = 0; i < count; i++) {
         e[i] = error[i];
         for (int j = 0; j < count; j++) {
@@ -403,7 +466,8 @@ void algebraic_spread(const struct algebraic *system, struct algebraic_room room
 
 bool algebraic_fails(const struct algebraic *system, struct algebraic_room room,
                      const double given[], double t, double unknown[], char *text, size_t size) {
-    const struct algebraic_report report = algebraic_solve(system, room, given, false, unknown);
+    const struct algebraic_report report =
+        algebraic_solve(system, room, given, false, false, unknown);
     const char *more = strlen(system->names) > MOST_SHOWN ? "..." : "";
     switch (report.outcome) {
     case ALGEBRAIC_SOLVED:

@@ -13,12 +13,14 @@ struct algebraic {
     const char *names;     /* of the unknowns, with commas */
     const char *equations; /* texts of the equations, with semicolons */
     int count;
+    bool has_modes;           /* true if modes may follow from the unknowns */
     const double *nominal;    /* of each unknown, above 0, in its unit */
     const double *low, *high; /* bounds of each unknown */
 
     /* Writes the residuals and, unless slope is NULL, their derivatives by the unknowns, row after
-     * row; those that are always 0 are 0 already. given: what the equations read. */
-    void (*evaluate)(const double given[], const double unknown[], double residual[],
+     * row; those that are always 0 are 0 already. given: what the equations read. is_free: true
+     * if modes follow from the unknowns, else they are given. */
+    void (*evaluate)(const double given[], bool is_free, const double unknown[], double residual[],
                      double slope[]);
 };
 
@@ -50,9 +52,12 @@ struct algebraic_report {
 };
 
 /* Solves the system from the guess in `unknown`, which gets the solution, or NAN if there is none.
- * is_near: only a solution counts that the method reaches without damping. */
+ * is_near: only a solution counts that the method reaches without damping. is_free: as of evaluate.
+ * In given modes a guess may be where the equations are not finite; then the search begins at the
+ * solution in free modes. */
 struct algebraic_report algebraic_solve(const struct algebraic *system, struct algebraic_room room,
-                                        const double given[], bool is_near, double unknown[]);
+                                        const double given[], bool is_near, bool is_free,
+                                        double unknown[]);
 
 /* Writes one line that says why there is no solution, to text (size bytes); unknown: the guess.
  * Returns false if there is one, which `unknown` gets. */

@@ -26,12 +26,17 @@ static void complete(double value[], const double other[], size_t count) {
     }
 }
 
-/* Updates the modes of room.values by its states and inputs; a relation that is not defined keeps
- * its mode. Returns false if `values` has the same modes. */
+/* Updates the modes of room.values, and the anchors with them, by its states and inputs; a relation
+ * that is not defined keeps its mode. Returns false if `values` has the same modes. */
 static bool update_modes(const struct domains *model, struct domains_room room, const void *values,
                          double t) {
     int *holds = modes_in(model, room.values);
     bool changes = true;
+    if (model->anchor != NULL) {
+        model->anchor(room.values, t, doubles_in(room.values, model->states),
+                      doubles_in(room.values, model->inputs), SEARCH_FREE,
+                      doubles_in(room.values, model->anchors));
+    }
     for (int count = 0; changes && count <= model->relation_count; count++) {
         changes = false;
         model->write_distances(room.values, t, room.distance);
@@ -94,10 +99,11 @@ static void complete_indicators(const struct domains *model, struct domains_room
 enum status domains_indicators(const struct domains *model, struct domains_room room,
                                const void *values, double t, const double x[], const double u[],
                                double z[]) {
-    if (!update_modes_at(model, room, values, t, x, u)) {
-        return STATUS_OK;
-    }
+    const bool changes = update_modes_at(model, room, values, t, x, u);
     const enum status status = model->write_indicators(room.values, t, x, u, room.result);
+    if (!changes) {
+        return status;
+    }
     complete_indicators(model, room, values, z, room.result);
     return status;
 }
@@ -163,7 +169,9 @@ enum status domains_extend(const struct domains *model, struct domains_room room
     for (size_t i = 0; i < count_of(model->inputs); i++) {
         doubles_in(room.values, model->inputs)[i] = origin->inputs[i][0];
     }
-    (void)update_modes(model, room, origin->values, origin->t);
+    if (!update_modes(model, room, origin->values, origin->t)) {
+        return model->extend(origin, first, last, row);
+    }
     struct series_origin here = *origin;
     here.values = room.values;
     const enum status status = model->extend(&here, first, last, row);

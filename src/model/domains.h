@@ -20,6 +20,11 @@ struct domains {
     int relation_count;
     const struct relation *relation;
     const size_t *row_of_indicator;
+    struct range anchors;
+    void (*anchor)(const void *values, double t, const double x[], const double u[],
+                   enum model_search search, double anchors[]); /* as in struct model */
+    const size_t *solution; /* rows of the series with solutions of equations */
+    size_t solution_count;
     size_t own_row; /* row of the series that is 1 in order 0 if it is not in the modes of its
                        values */
     void (*write_distances)(const void *values, double t, double distance[]);
@@ -44,29 +49,25 @@ struct domains_room {
     double *result;   /* one per state or indicator */
 };
 
-static inline bool domains_are_finite(const double value[], size_t count) {
-    double sum = 0.0;
-    for (size_t i = 0; i < count; i++) {
-        sum += 0.0 * value[i];
-    }
-    return sum == 0.0;
-}
-
 /* True if all calculated fields are finite. */
 static inline bool domains_are_calculated(const struct domains *model, const void *values) {
     const char *begin = values;
-    return domains_are_finite((const double *)(const void *)(begin + model->calculated.offset),
-                              model->calculated.size / sizeof(double)) &&
-           domains_are_finite((const double *)(const void *)(begin + model->indicators.offset),
-                              model->indicators.size / sizeof(double));
+    return relations_are_finite((const double *)(const void *)(begin + model->calculated.offset),
+                                model->calculated.size / sizeof(double)) &&
+           relations_are_finite((const double *)(const void *)(begin + model->indicators.offset),
+                                model->indicators.size / sizeof(double));
 }
 
-/* True if the states' coefficients of order 1 are finite, in a series from order 0 to last. */
+/* True if the states' coefficients of order 1 and all solutions are finite, in a series from order
+ * 0 to last. */
 static inline bool domains_has_begun(const struct domains *model, int last,
                                      double row[][SERIES_LENGTH]) {
     double sum = 0.0;
     for (size_t i = 0; last > 0 && i < model->states.size / sizeof(double); i++) {
         sum += 0.0 * row[i][1];
+    }
+    for (size_t i = 0; i < model->solution_count; i++) {
+        sum += 0.0 * row[model->solution[i]][0];
     }
     return sum == 0.0;
 }

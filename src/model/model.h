@@ -205,6 +205,14 @@ struct expression {
     const char *text;
 };
 
+/* How solutions of equations are searched. */
+enum model_search {
+    SEARCH_NEAR, /* only those near the anchors count, as for the right-hand side and the other pure
+                    functions */
+    SEARCH_FAR,
+    SEARCH_FREE, /* in the modes that follow from the solutions */
+};
+
 /* ---- The model ------------------------------------------------------------------------------ */
 
 struct model {
@@ -254,10 +262,9 @@ struct model {
     struct range anchors;
 
     /* Writes to anchors the solutions at t, x and u, searched from the anchors in values; where
-     * there is none, these. is_near: only solutions near these count, as for the right-hand side
-     * and the other pure functions. NULL if there are no anchors. */
-    void (*anchor)(const void *values, double t, const double x[], const double u[], bool is_near,
-                   double anchors[]);
+     * there is none, these. NULL if there are no anchors. */
+    void (*anchor)(const void *values, double t, const double x[], const double u[],
+                   enum model_search search, double anchors[]);
 
     /* Writes one line that says which equations have no solution with the values that are set, to
      * text (size bytes). Returns false if all have one. NULL if none need each other. */

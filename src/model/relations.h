@@ -58,6 +58,7 @@ struct given {
     double inputs;              /* relative error of all inputs */
     const double *largest;      /* of each input so far: its error is relative to it, too */
     const double *du;           /* derivative of each input by the time */
+    bool is_free; /* true if solutions are searched in the modes that follow from them */
 };
 
 struct relations {
@@ -138,6 +139,15 @@ enum status relations_update(const struct relations *model, struct relations_roo
 void relations_errors(const struct relations *model, struct relations_room room, const void *values,
                       double t, const double state_errors[], const double largest_inputs[],
                       double relative, double errors[]);
+
+/* True if all values are finite: 0 x is 0 for finite values only. */
+static inline bool relations_are_finite(const double value[], size_t count) {
+    double sum = 0.0;
+    for (size_t i = 0; i < count; i++) {
+        sum += 0.0 * value[i];
+    }
+    return sum == 0.0;
+}
 
 /* Returns the last segment that begins at or below x, from the rising begins of all segments; the
  * first one if none does. */

@@ -32,8 +32,8 @@ double relations_next_time(const struct relations *model, struct relations_room 
 void relations_errors(const struct relations *model, struct relations_room room, const void *values,
                       double t, const double state_errors[], const double largest_inputs[],
                       double relative, double errors[]) {
-    const struct given given = {state_errors, relative * fabs(t), relative, largest_inputs,
-                                room.zeros};
+    const struct given given = {state_errors,   relative * fabs(t), relative,
+                                largest_inputs, room.zeros,         false};
     model->compare(values, t, &given, room.compared);
     for (int k = 0; k < model->relation_count; k++) {
         if (!model->relation[k].is_timed) {

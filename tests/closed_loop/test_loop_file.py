@@ -66,7 +66,7 @@ def test_a_file_of_another_kind_is_refused_by_name(
     expected, path = TABLES["kinds"][command][0], tmp_path / "file.toml"
     for other, (kind, text) in TABLES["kinds"].items():
         path.write_text(f"name = 'X'\n{text}\n", encoding="utf-8")
-        if other != command:
+        if other != command and (command, other) != ("build", "system"):  # that builds one FMU
             way_out = TABLES["writers"].get(command) if other == "build" else None
             way_out = (way_out or f"{other} FILE takes it").replace("FILE", str(path))
             wrong = f"{path}: is {kind}, expected {expected}: ./run.sh {way_out}"

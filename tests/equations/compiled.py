@@ -73,7 +73,14 @@ class Model:
         shared = ROOT / "src" / "model"
         runtime = [
             shared / name
-            for name in ("algebraic.c", "relations.c", "relations_asked.c", "domains.c", "random.c")
+            for name in (
+                "algebraic.c",
+                "relations.c",
+                "relations_asked.c",
+                "relations_modes.c",
+                "domains.c",
+                "random.c",
+            )
         ]
         sources = [folder / "equations.c", *runtime]
         files = [*sorted(shared.glob("*.?")), folder / "equations.h", folder / "equations.c"]

@@ -492,6 +492,90 @@ def test_random_models_follow_scipy() -> None:
     assert not found, "\n".join(found)
 
 
+# ---- Limits of unknowns --------------------------------------------------------------------------
+
+# x falls through 0; z has the sign of x, and what its branch calculates beyond 0 is no solution, or
+# one that clings to 0, or a root of a negative number
+LIMITS = {
+    "clings": ("z + z / sqrt(abs(z) + 0.01)", lambda z: z + z / np.sqrt(np.abs(z) + 0.01)),
+    "edge": (
+        "z + (sqrt(z) if z > 0 else -sqrt(-z))",
+        lambda z: z + np.sign(z) * np.sqrt(np.abs(z)),
+    ),
+    "one_edge": (
+        "z + (sqrt(z) if z > 0 else z)",
+        lambda z: z + (np.sqrt(z) if z > 0 else z),
+    ),
+    "ends_behind": (
+        "z + (sqrt(z + 1e-3) if z > 0 else 2 * sqrt(1e-3) - sqrt(1e-3 - z)) - sqrt(1e-3)",
+        lambda z: z + np.sign(z) * (np.sqrt(np.abs(z) + 1e-3) - np.sqrt(1e-3)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LIMITS)
+@pytest.mark.parametrize("guess", ["", "start = 1, "], ids=["anchor", "start"])
+def test_unknowns_pass_their_limits(name: str, guess: str, tmp_path: Path) -> None:
+    text, of = LIMITS[name]
+    model = 'name = "M"\n[states]\nx = { start = 1, derivative = "-0.9 * x - 1" }\n[algebraic]\n'
+    unit, _ = made(tmp_path, model + f'z = {{ {guess}equation = "{text} - x" }}\n')
+    for method in METHODS:
+        if name == "edge" and method in ("cvode_bdf", "taylor"):
+            continue  # between two vertical tangents one takes seconds, the other may not pass
+        rows = run(unit, method, 1e-8, 3, 0.1, ["z", "event_count"])
+        x = (1 + 1 / 0.9) * np.exp(-0.9 * rows["time"]) - 1 / 0.9
+        expected = [brentq(lambda z, at=at: of(z) - at, -2, 2, xtol=1e-15) for at in x]
+        np.testing.assert_allclose(rows["z"], expected, atol=1e-8, err_msg=method)
+        if name == "clings":
+            assert list(rows["event_count"][[0, -1]]) == [0, 1], method
+
+
+# Three tanks at a junction with the pressure p; each pipe may flow either way
+TANKS = """
+name = "Tanks"
+[states]
+h1 = { start = 2, derivative = "sin(time) - q1" }
+h2 = { start = 0.1, derivative = "q2 - 0.3 * flow(p - 0.5)" }
+h3 = { start = 1, derivative = "q3 + 0.3 * cos(2 * time) - 0.1 * h3" }
+[functions]
+flow = { arguments = ["x"], value = "x / sqrt(abs(x) + 1e-3)" }
+[where]
+q1 = "0.5 * flow(h1 - p)"
+q2 = "0.5 * flow(p - h2)"
+q3 = "flow(p - h3)"
+[algebraic]
+p = { equation = "q1 - q2 - q3" }
+"""
+
+
+def test_flows_that_turn_at_a_junction(tmp_path: Path) -> None:
+    """The guess for p is 0, from where all pipes would flow to the junction."""
+
+    def flow(x: float) -> float:
+        return x / np.sqrt(abs(x) + 1e-3)
+
+    def rates(t: float, h: np.ndarray) -> list[float]:
+        def missing(p: float) -> float:
+            return 0.5 * flow(h[0] - p) - 0.5 * flow(p - h[1]) - flow(p - h[2])
+
+        p = brentq(missing, min(h), max(h), xtol=1e-15)
+        return [
+            np.sin(t) - 0.5 * flow(h[0] - p),
+            0.5 * flow(p - h[1]) - 0.3 * flow(p - 0.5),
+            flow(p - h[2]) + 0.3 * np.cos(2 * t) - 0.1 * h[2],
+        ]
+
+    expected = solve_ivp(rates, (0, 20), [2, 0.1, 1], "LSODA", rtol=1e-11, atol=1e-12).y[:, -1]
+    names, events = ["h1", "h2", "h3"], set()
+    unit, _ = made(tmp_path, TANKS)
+    for method in METHODS:
+        for step in (0.05, 2.0):
+            end = run(unit, method, 1e-9, 20, step, [*names, "event_count"])[-1]
+            np.testing.assert_allclose([end[n] for n in names], expected, atol=1e-7)
+            events.add(end["event_count"])
+    assert len(events) == 1 and events.pop() >= 5
+
+
 UNTAKEN = """
 name = "Untaken"
 [states]

@@ -61,7 +61,7 @@ static void test_bounds_are_those_of_the_inverse(void) {
 /* ---- Newton's method ------------------------------------------------------------------------ */
 
 /* sin z = given */
-static void sine(const double given[], const double z[], double r[], double slope[]) {
+static void sine(const double given[], bool is_free, const double z[], double r[], double slope[]) {
     r[0] = sin(z[0]) - given[0];
     if (slope != NULL) {
         slope[0] = cos(z[0]);
@@ -69,7 +69,8 @@ static void sine(const double given[], const double z[], double r[], double slop
 }
 
 /* u = Vt log(1 + i / Is) + R i, in A: i is 1e-12 or 1. */
-static void diode(const double given[], const double i[], double r[], double slope[]) {
+static void diode(const double given[], bool is_free, const double i[], double r[],
+                  double slope[]) {
     r[0] = 0.026 * log1p(i[0] / 1e-12) + 5.0 * i[0] - given[0];
     if (slope != NULL) {
         slope[0] = 0.026 / (1e-12 + i[0]) + 5.0;
@@ -77,7 +78,8 @@ static void diode(const double given[], const double i[], double r[], double slo
 }
 
 /* z^2 = given */
-static void square(const double given[], const double z[], double r[], double slope[]) {
+static void square(const double given[], bool is_free, const double z[], double r[],
+                   double slope[]) {
     r[0] = z[0] * z[0] - given[0];
     if (slope != NULL) {
         slope[0] = 2.0 * z[0];
@@ -85,7 +87,8 @@ static void square(const double given[], const double z[], double r[], double sl
 }
 
 /* The intersection of a circle and a hyperbola: x^2 + y^2 = 4, x y = given. */
-static void curves(const double given[], const double z[], double r[], double slope[]) {
+static void curves(const double given[], bool is_free, const double z[], double r[],
+                   double slope[]) {
     r[0] = z[0] * z[0] + z[1] * z[1] - 4.0;
     r[1] = z[0] * z[1] - given[0];
     if (slope != NULL) {
@@ -96,12 +99,32 @@ static void curves(const double given[], const double z[], double r[], double sl
     }
 }
 
-static struct algebraic_report
-solved(int count, void (*evaluate)(const double[], const double[], double[], double[]),
-       double given, bool is_near, double z[]) {
-    const struct algebraic system = {"z",         "equations",  count,   one,
-                                     nowhere_low, nowhere_high, evaluate};
-    return algebraic_solve(&system, ALGEBRAIC_ROOM(2), &given, is_near, z);
+/* 1/(z - 0.3) = given */
+static void pole(const double given[], bool is_free, const double z[], double r[], double slope[]) {
+    r[0] = 1.0 / (z[0] - 0.3) - given[0];
+    if (slope != NULL) {
+        slope[0] = -1.0 / ((z[0] - 0.3) * (z[0] - 0.3));
+    }
+}
+
+/* z + sqrt(z) = x where z > 0, and z - sqrt(-z) = x elsewhere; given: x, and whether z > 0. */
+static void roots(const double given[], bool is_free, const double z[], double r[],
+                  double slope[]) {
+    const bool is_above = is_free ? z[0] > 0.0 : given[1] != 0.0;
+    const double root = sqrt(is_above ? z[0] : -z[0]);
+    r[0] = z[0] + (is_above ? root : -root) - given[0];
+    if (slope != NULL) {
+        slope[0] = 1.0 + 0.5 / root;
+    }
+}
+
+typedef void equations(const double[], bool, const double[], double[], double[]);
+
+static struct algebraic_report solved(int count, equations *evaluate, double given, bool is_near,
+                                      double z[]) {
+    const struct algebraic system = {"z", "equations", count,        false,
+                                     one, nowhere_low, nowhere_high, evaluate};
+    return algebraic_solve(&system, ALGEBRAIC_ROOM(2), &given, is_near, false, z);
 }
 
 static void test_a_solution_is_kept_bit_by_bit(void) {
@@ -134,7 +157,7 @@ static void test_currents_over_twelve_decades(void) {
     for (int k = -30; k <= 60; k++) {
         const double u = 0.1 * k;
         double i[] = {0.0};
-        double none[] = {-1e-12};
+        double none[] = {-1.0};
         const bool has_one = u > -0.5; // else i + Is is no double
         if (!has_one) {
             continue;
@@ -151,12 +174,50 @@ static void test_currents_over_twelve_decades(void) {
 static void test_bisection_between_bounds(void) {
     static const double low[] = {-1.0};
     static const double high[] = {100.0};
-    const struct algebraic system = {"z", "z**2 = 2", 1, one, low, high, square};
+    const struct algebraic system = {"z", "z**2 = 2", 1, false, one, low, high, square};
     const double given = 2.0;
     double z[] = {0.0}; // the slope is 0
     TEST_ASSERT_EQUAL(ALGEBRAIC_SOLVED,
-                      algebraic_solve(&system, ALGEBRAIC_ROOM(1), &given, false, z).outcome);
+                      algebraic_solve(&system, ALGEBRAIC_ROOM(1), &given, false, false, z).outcome);
     TEST_ASSERT_DOUBLE_WITHIN(DBL_EPSILON, sqrt(2.0), z[0]);
+}
+
+/* Its residual changes sign between the bounds, and is 0 at 1000.3 only. */
+static void test_a_pole_is_no_solution(void) {
+    static const double low[] = {-10.0};
+    static const double high[] = {10.0};
+    const struct algebraic system = {"z", "1/(z - 0.3) = u", 1, false, one, low, high, pole};
+    const double given = 1e-3;
+    double z[] = {0.0};
+    char text[256];
+    TEST_ASSERT_TRUE(
+        algebraic_fails(&system, ALGEBRAIC_ROOM(1), &given, 2.0, z, text, sizeof text));
+    TEST_ASSERT_NOT_NULL(strstr(text, "z: no solution at t = 2, largest residual 0."));
+}
+
+static void test_modes_follow_from_the_unknown(void) {
+    const struct algebraic system = {"z",         "equations",  1,    true, one,
+                                     nowhere_low, nowhere_high, roots};
+    for (int k = -20; k <= 20; k++) {
+        for (int g = -5; g <= 5; g++) {
+            const double x = 0.1 * k;
+            const double root = 0.5 * (sqrt(1.0 + 4.0 * fabs(x)) - 1.0);
+            const double expected = x > 0.0 ? root * root : -root * root;
+            double z[] = {0.3 * g};
+            const double free[] = {x, 0.0};
+            TEST_ASSERT_EQUAL(
+                ALGEBRAIC_SOLVED,
+                algebraic_solve(&system, ALGEBRAIC_ROOM(1), free, false, true, z).outcome);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-15, expected, z[0]);
+            // in given modes the guess may be where the root is none
+            const double held[] = {x, x > 0.0};
+            z[0] = 0.3 * g;
+            TEST_ASSERT_EQUAL(
+                ALGEBRAIC_SOLVED,
+                algebraic_solve(&system, ALGEBRAIC_ROOM(1), held, false, false, z).outcome);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-15, expected, z[0]);
+        }
+    }
 }
 
 static void test_failures_say_what_has_happened(void) {
@@ -167,7 +228,7 @@ static void test_failures_say_what_has_happened(void) {
     const struct algebraic_report report = solved(1, square, -1.0, false, z);
     TEST_ASSERT_EQUAL(ALGEBRAIC_FAR, report.outcome);
     TEST_ASSERT_TRUE(report.residual >= 1.0 && report.iterations > 0);
-    const struct algebraic system = {"z",         "z**2 = given", 1,     one,
+    const struct algebraic system = {"z",         "z**2 = given", 1,     false, one,
                                      nowhere_low, nowhere_high,   square};
     const double given = -1.0;
     char text[200];

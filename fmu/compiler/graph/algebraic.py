@@ -18,13 +18,14 @@ from typing import TYPE_CHECKING
 from ..expressions.expression import in_order
 
 if TYPE_CHECKING:
-    from .graph import Graph, Value
+    from .graph import Graph, Relation, Value
 
 VECTORS = ("solution", "linear")
 FACTORS = ("factors", "slopes")
 SEVERAL = (*FACTORS, *VECTORS)  # with several results
 FOLDED = {"+": operator.add, "-": operator.sub, "*": operator.mul, "negative": operator.neg}
 UNKNOWN, GIVEN = "unknown", "given"  # leaves of a system's equations
+FREE = "is free"  # a mode in them: while the unknowns are searched, all modes follow from them
 
 
 @dataclass(eq=False)
@@ -43,6 +44,7 @@ class System:
     high: list[float]
     solution: Value  # where the file has it
     bends: dict[tuple[int, int], dict[Value, Value]]  # derivatives of the slopes by leaves
+    free: tuple[list[Value], list[Value]] | None  # residuals and slopes in modes that follow
     at: dict[Value, Placed] = field(default_factory=dict)  # by solution
 
 
@@ -136,11 +138,12 @@ def put(graph: Graph, by: Mapping[Value, Value], first: int) -> None:
 def solved(
     graph: Graph, names: list[str], texts: list[str], unknowns: list[Value],
     residuals: list[Value], guesses: Callable[[], list[Value]],
-    ranges: tuple[list[float], list[float], list[float]],
+    ranges: tuple[list[float], list[float], list[float]], relations: Sequence[Relation],
 ) -> tuple[list[Value], bool]:  # fmt: skip
     """Return the unknowns as values of a graph, and whether their equations are linear.
 
-    unknowns: leaves of the residuals. ranges: nominal values, lower and upper bounds.
+    unknowns: leaves of the residuals. ranges: nominal values, lower and upper bounds. relations:
+    those whose distances may follow from the unknowns.
     """
     rows = graph.gradients(residuals, unknowns)
     slopes = {
@@ -164,28 +167,48 @@ def solved(
         vector = graph.value("linear", matrix(graph, slopes), *right)
         graph.linear.append(Linear(names, texts, vector))
         return components(graph, vector, len(unknowns)), True
+    held = [*residuals, *slopes.values()]
+    followed = _followed(graph, relations, own)
+    roots = [*held, *replaced(graph, held, followed)] if followed else held
     outside: dict[Value, None] = {}  # what the equations read
-    for value in in_order([*residuals, *slopes.values()]):
+    for value in in_order(roots):
         if value.leaves & own:
             outside |= dict.fromkeys(
                 a for a in value.arguments if not a.leaves & own and a.op != "number"
             )
-    for value in (*residuals, *slopes.values()):
+    for value in roots:
         if not value.leaves & own and value.op != "number":
             outside[value] = None
+    outside.pop(graph.value("mode", name=FREE), None)
     given = [graph.given(value, i) for i, value in enumerate(outside)]
     by = dict(zip(outside, given, strict=True))
-    found = replaced(graph, [*residuals, *slopes.values()], by)
-    own_slopes = dict(zip(slopes, found[len(residuals) :], strict=True))
+    found = replaced(graph, roots, by)
+    count = len(residuals)
+    own_slopes = dict(zip(slopes, found[count : len(held)], strict=True))
+    free = found[len(held) :]
     name = f"{len(graph.systems) + 1}"
     numbers = [leaf for leaf in given if leaf.op == GIVEN]
     bends = graph.gradients(own_slopes.values(), [*unknowns, *numbers])
     vector = graph.value("solution", *outside, *guesses(), name=name)
     graph.systems[name] = System(
-        name, names, texts, unknowns, given, found[: len(residuals)], own_slopes, *ranges, vector,
-        dict(zip(own_slopes, bends, strict=True)),
+        name, names, texts, unknowns, given, found[:count], own_slopes, *ranges, vector,
+        dict(zip(own_slopes, bends, strict=True)), (free[:count], free[count:]) if free else None,
     )  # fmt: skip
     return components(graph, vector, len(unknowns)), False
+
+
+def _followed(
+    graph: Graph, relations: Iterable[Relation], own: set[tuple[str, str]]
+) -> dict[Value, Value]:
+    """Return modes that follow from unknowns, where modes are free: by the modes."""
+    free, zero = graph.value("mode", name=FREE), graph.number(0.0)
+    found: dict[Value, Value] = {}
+    for relation in relations:
+        (distance,) = replaced(graph, [relation.distance], found)
+        if relation.time is None and distance.leaves & own:
+            holds = graph.value(">=" if relation.includes_zero else ">", distance, zero)
+            found[relation.mode] = graph.value("if", free, holds, relation.mode)
+    return found
 
 
 def placed(graph: Graph, solution: Value) -> Placed:

@@ -160,6 +160,7 @@ class Blocks:
                 residuals,
                 lambda: [self._guess(name) for name in block.unknowns],
                 self._ranges(block.unknowns),
+                [*graph.relations.values()][first:],
             )
         by = dict(zip(unknowns, found, strict=True))
         algebraic.put(graph, by, first)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 
-from ..graph.algebraic import System, components
+from ..graph.algebraic import FREE, System, components
 from ..graph.graph import CONDITIONS
 from ..read.content import ModelFile
 from . import c_hook
@@ -43,12 +43,11 @@ def parts(file: ModelFile, followed: list[str]) -> dict[str, list[str]]:
         "",
     ]
     if file.anchors:
-        size = f"sizeof(double) * {2 * len(file.anchors)}"
-        place = f"offsetof({c_hook.structure(file)}, {ANCHORS})"
-        solving += [f".anchors = {{{place}, {size}}},", ".anchor = anchor,"]
+        solving += anchors(file)
         solutions += [
             "static void anchor(const void *values_pointer, double time, const double state[],",
-            "                   const double input[], bool is_near, double anchors[]) {",
+            "                   const double input[], enum model_search search,",
+            "                   double anchors[]) {",
             head,
             "    (void)values;",
             *indented(_anchored(file)),
@@ -63,6 +62,15 @@ def parts(file: ModelFile, followed: list[str]) -> dict[str, list[str]]:
     }
 
 
+def anchors(file: ModelFile) -> list[str]:
+    """Return the members of a struct for anchors, if there are any."""
+    if not file.anchors:
+        return []
+    size = f"sizeof(double) * {2 * len(file.anchors)}"
+    place = f"offsetof({c_hook.structure(file)}, {ANCHORS})"
+    return [f".anchors = {{{place}, {size}}},", ".anchor = anchor,"]
+
+
 def _system(file: ModelFile, system: System) -> list[str]:
     """Return the struct algebraic of a system, and the function that solves it."""
     count, number = len(system.unknowns), system.name
@@ -74,9 +82,14 @@ def _system(file: ModelFile, system: System) -> list[str]:
         for i, leaf in enumerate(system.unknowns)
     }
     found = leaves(file)
-    code = Code(Leaves({**given, **own}, found.names, found.arrays, found.conditions))
-    residuals = {Place("residual[", i, "]"): of for i, of in enumerate(system.residuals)}
-    slopes = {Place("slope[", i * count + j, "]"): of for (i, j), of in system.slopes.items()}
+    places = {**given, **own, ("mode", FREE): "is_free"}
+    code = Code(Leaves(places, found.names, found.arrays, found.conditions))
+    of_residuals, of_slopes = system.free or (system.residuals, system.slopes.values())
+    residuals = {Place("residual[", i, "]"): of for i, of in enumerate(of_residuals)}
+    slopes = {
+        Place("slope[", i * count + j, "]"): of
+        for (i, j), of in zip(system.slopes, of_slopes, strict=True)
+    }
     first, second = of_both(code, residuals, slopes, "slope", "return;")
     rows = {
         f"nominal_{number}": system.nominal,
@@ -84,8 +97,9 @@ def _system(file: ModelFile, system: System) -> list[str]:
         f"high_{number}": system.high,
     }
     return [
-        f"static void evaluate_{number}(const double given[], const double unknown[],",
-        "                               double residual[], double slope[]) {",
+        f"static void evaluate_{number}(const double given[], bool is_free,",
+        "                               const double unknown[], double residual[],",
+        "                               double slope[]) {",
         "    (void)given;",
         *indented([*first, *second]),
         "}",
@@ -95,14 +109,15 @@ def _system(file: ModelFile, system: System) -> list[str]:
         f"static const struct algebraic system_{number} = {{",
         f"    {text(', '.join(system.names))},",
         f"    {text('; '.join(system.texts))},",
-        f"    {count}, nominal_{number}, low_{number}, high_{number}, evaluate_{number},",
+        f"    {count}, {str(system.free is not None).lower()}, nominal_{number}, low_{number}, "
+        f"high_{number}, evaluate_{number},",
         "};",
         "",
         f"MAYBE_UNUSED static void factorize_{number}(const double given[],",
         "                                      const double unknown[], double matrix[],",
         "                                      int pivot[]) {",
         f"    double residual[{count}];",
-        f"    evaluate_{number}(given, unknown, residual, matrix);",
+        f"    evaluate_{number}(given, false, unknown, residual, matrix);",
         f"    algebraic_factorize({count}, matrix, pivot);",
         "}",
         "",
@@ -111,9 +126,11 @@ def _system(file: ModelFile, system: System) -> list[str]:
         f"    algebraic_spread(&system_{number}, ALGEBRAIC_ROOM({count}), given, unknown, error);",
         "}",
         "",
-        f"static void solve_{number}(const double given[], bool is_near, double unknown[]) {{",
-        f"    (void)algebraic_solve(&system_{number}, ALGEBRAIC_ROOM({count}), given, is_near,",
-        "                          unknown);",
+        f"static bool solve_{number}(const double given[], bool is_near, bool is_free,",
+        "                            double unknown[]) {",
+        f"    return algebraic_solve(&system_{number}, ALGEBRAIC_ROOM({count}), given, is_near,",
+        "                           is_free, unknown)",
+        "               .outcome == ALGEBRAIC_SOLVED;",
         "}",
         "",
     ]
@@ -162,7 +179,8 @@ def _failures(file: ModelFile) -> list[str]:
 
 def _anchored(file: ModelFile) -> list[str]:
     """Write the solutions, or the old anchors."""
-    code, stores = Code(arrays(file).but({}, is_near="is_near")), []
+    places = arrays(file).but({}, is_near="search == SEARCH_NEAR", is_free="search == SEARCH_FREE")
+    code, stores = Code(places), []
     for i, name in enumerate(file.anchors):
         value, before = code.of(file.anchors[name].value), code.leaves["anchor", name]
         kept = "if", ("isfinite", value), value, before

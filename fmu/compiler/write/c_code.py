@@ -34,12 +34,21 @@ class Leaves(dict[tuple[str, str], Operand]):
         super().__init__(places)
         self.names, self.arrays, self.conditions = names, arrays, conditions
         self.is_near = "false"  # or true, in C: solutions are searched near their anchors only
+        self.is_free = "false"  # or true, in C: modes follow where solutions are searched
+        self.is_solved = ""  # variable of C that is false where a system is not solved
         self.count = itertools.count(1)  # of the arrays of systems in a function
 
-    def but(self, own: Mapping[tuple[str, str], Operand], is_near: str = "") -> Leaves:
+    def but(
+        self,
+        own: Mapping[tuple[str, str], Operand],
+        is_near: str = "",
+        is_free: str = "",
+        is_solved: str = "",
+    ) -> Leaves:
         """Return these leaves, of which some are elsewhere."""
         found = Leaves({**self, **own}, self.names, self.arrays, self.conditions)
         found.is_near = is_near or self.is_near
+        found.is_free, found.is_solved = is_free or self.is_free, is_solved or self.is_solved
         found.count = self.count
         return found
 
@@ -158,6 +167,8 @@ class Code(Writer):
                 )
             ),
         ]
+        if noted := self.leaves.is_solved:
+            self.statements.append(Statement((f"{noted} &= isfinite({name}[0]) != 0;",)))
         return name
 
     def bounds(self, factors: str, errors: Sequence[Operand]) -> str:
@@ -190,13 +201,14 @@ class Code(Writer):
         read, guesses = given[:-count], given[-count:]
         has_anchors = any(a.op == "anchor" for a in value.arguments)
         is_near = self.leaves.is_near if has_anchors else "false"
+        noted = f"{self.leaves.is_solved} &= " if self.leaves.is_solved else "(void)"
         self.statements += [
             Statement((f"double {name}[] = ", *in_row(guesses, ""), ";")),
             Statement(
                 (
-                    f"solve_{value.name}(",
+                    f"{noted}solve_{value.name}(",
                     *in_row(read),
-                    f", {is_near}, {name});",
+                    f", {is_near}, {self.leaves.is_free}, {name});",
                 )
             ),
         ]

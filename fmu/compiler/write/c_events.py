@@ -225,6 +225,7 @@ class Events:
             return []
         file, timed = self.file, [r for r in self.relations if r.time is not None]
         states = file.of("states")
+        searched = Code(arrays(file).but({}, is_solved="is_solved"))
         places = {relation.name: i for i, relation in enumerate(self.relations)}
         indicators = {
             Place("indicator[", i, "]"): z for i, z in enumerate(self.indicators().values())
@@ -285,7 +286,8 @@ class Events:
             table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
             **self._rest(),
-            indicators=Code(arrays(file)).assign(indicators).lines(),
+            indicators=searched.assign(indicators).lines(),
+            **self._is_known(),
             compare=self._compare(),
             times=Code(self.leaves).assign(times).lines(),
             due=self._due(),
@@ -299,6 +301,19 @@ class Events:
                 [text(file.relation_texts[places[r.name]][:100]) for r in self.located] or ["NULL"]
             ),
         ).splitlines()
+
+    def _is_known(self) -> dict[str, list[str]]:
+        """Whether indicators that are not finite miss a solution: others may miss a branch."""
+        if not (self.graph.systems or self.graph.linear):
+            return {"is_solved": [], "unless_solved": []}
+        return {
+            "is_solved": ["bool is_solved = true;"],
+            "unless_solved": [
+                f"if (!is_solved && !relations_are_finite(indicator, {len(self.located)})) {{",
+                "    return STATUS_NOT_FINITE;",
+                "}",
+            ],
+        }
 
     def _circles(self) -> list[str]:
         """Members of struct relations about relations that follow from themselves."""
@@ -338,7 +353,7 @@ class Events:
     def _compare(self) -> list[str]:
         graph, states, inputs = self.graph, self.file.of("states"), self.file.of("inputs")
         moving = {("first", v.name): Place("given->du[", i, "]") for i, v in enumerate(inputs)}
-        code = Code(self.leaves.but(moving))
+        code = Code(self.leaves.but(moving, is_free="given->is_free"))
         motion = {x.leaf: x.value for x in states} | {graph.value("time"): graph.number(1.0)}
         motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
         given: dict[tuple[str, str], Operand] = {

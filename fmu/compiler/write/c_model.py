@@ -232,7 +232,7 @@ def _series(file: ModelFile, series: Series, has_domains: bool) -> dict[str, obj
     if file.hook:
         of_name = dict(zip(file.hook.series, rows, strict=True))
         rows = [of_name.get(name, "0") for name in file.hook.indicators]
-    inner, solutions = series.inner(), series.solutions()
+    inner = series.inner()
     return {
         **series.parts(),
         "row_count": series.row_count + has_domains,
@@ -245,21 +245,28 @@ def _series(file: ModelFile, series: Series, has_domains: bool) -> dict[str, obj
         "may_vanish": str(series.may_vanish).lower(),
         "is_of_time": str(series.is_of_time).lower(),
         "inner_count": len(inner),
-        "solutions_of_series": [
-            f".solutions = (const size_t[]){{{', '.join(map(str, solutions))}}},",
-            f".solution_count = {len(solutions)},",
-        ]
-        if solutions
-        else [],
+        "solutions_of_series": _solutions(series, ".solutions"),
         "inner_stride": len(series.columns) or 1,
     }
+
+
+def _solutions(series: Series, member: str) -> list[str]:
+    """Return the members of a struct for the rows of solutions; member: with their numbers."""
+    rows = series.solutions()
+    if not rows:
+        return []
+    numbers = ", ".join(map(str, rows))
+    return [f"{member} = (const size_t[]){{{numbers}}},", f".solution_count = {len(rows)},"]
 
 
 def _may_end(file: ModelFile) -> bool:
     """Return whether there are values beyond an event that are not finite."""
     roots = [v.value for v in file.of("states", *CALCULATED) if v.shown]
     roots += [relation.distance for relation in file.graph.located]
-    return any(v.op in FALLIBLE and v.arguments[-(v.op == "/")].moves for v in in_order(roots))
+    return any(
+        v.op in FALLIBLE and any(argument.moves for argument in v.arguments[-(v.op == "/") :])
+        for v in in_order(roots)
+    )
 
 
 def _domains(
@@ -276,9 +283,11 @@ def _domains(
     distances = {Place("distance[", i, "]"): r.distance for i, r in enumerate(events.relations)}
     text = filled(
         "domains.c.in",
-        distances=Code(leaves(file)).assign(distances).lines(),
+        distances=Code(leaves(file).but({}, is_free="true")).assign(distances).lines(),
         ranges=_range_lines(file, groups),
         own_row=series.row_count,
+        solutions=_solutions(series, ".solution"),
+        anchors=c_algebraic.anchors(file),
         jacobian_size=jacobian_size,
         located=len(events.located),
     )
