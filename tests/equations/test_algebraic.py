@@ -584,6 +584,14 @@ y = { derivative = "z if x > 2 else 0.5" }
 [algebraic]
 z = { start = 1, equation = "z**2 - (x - 1.5)" }
 """
+BOUNDED = """
+name = "Bounded"
+[parameters]
+u = { start = 1 }
+[algebraic]
+z = { min = 0, max = 10, equation = "z + w - u" }
+w = { start = 1, equation = "w**2 + z - 3" }
+"""
 ENDS = PROBLEMS["van_der_pol"]["text"].replace(", min = 1", "")
 
 
@@ -595,6 +603,13 @@ def test_a_block_in_a_branch_that_is_not_taken_needs_no_solution(
     unit, _ = made(tmp_path, UNTAKEN)
     end = run(unit, method, 1e-10, 4, 0.1, ["y"])[-1]
     assert abs(end["y"] - (1 + (2.5**1.5 - 0.5**1.5) * 2 / 3)) < 1e-8
+
+
+def test_unknowns_stay_within_their_bounds(tmp_path: Path) -> None:
+    """Without them w = 2, z = -1 is the nearer solution."""
+    unit, _ = made(tmp_path, BOUNDED)
+    end = fmpy.simulate_fmu(str(unit), output=["z", "w"])[-1]
+    assert abs(end["z"] - 2) < 1e-15 and abs(end["w"] + 1) < 1e-15
 
 
 @pytest.mark.parametrize("method", METHODS)

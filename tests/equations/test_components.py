@@ -183,6 +183,29 @@ def test_a_mistake_in_a_component_has_its_file_and_line(tmp_path: Path) -> None:
     )
 
 
+def test_a_cycle_without_a_solution_is_where_it_begins(tmp_path: Path) -> None:
+    """Two components that hand on each other's output, and a component that contradicts itself."""
+    (tmp_path / "gain.toml").write_text(
+        'name = "Gain"\n[inputs]\nu = {}\n[where]\nc = "c"\n[outputs]\ny = { value = "u" }\n'
+    )
+    path = tmp_path / "whole.toml"
+    path.write_text('name = "W"\n[components]\na = "gain.toml"\n')
+    with pytest.raises(ModelFileError) as refused:
+        read(path)
+    where = f"{path}: line 3: [components]: a: {tmp_path / 'gain.toml'}: line 5: [where]: c: "
+    assert str(refused.value) == f"{where}a.c = c does not determine a.c"
+    (tmp_path / "gain.toml").write_text(
+        'name = "Gain"\n[inputs]\nu = {}\n[outputs]\ny = { value = "u" }\n'
+    )
+    path.write_text(
+        'name = "W"\n[components]\na = "gain.toml"\nb = "gain.toml"\n'
+        '[connections]\na.u = "b.y"\nb.u = "a.y"\n'
+    )
+    with pytest.raises(ModelFileError) as refused:
+        read(path)
+    assert str(refused.value).startswith(f"{path}: line 6: [connections]: a.u: a.u, b.u, ")
+
+
 def test_names_that_are_one_in_c(tmp_path: Path) -> None:
     (tmp_path / "one.toml").write_text('name = "One"\n[parameters]\nb_c = { start = 1 }\n')
     (tmp_path / "two.toml").write_text('name = "Two"\n[parameters]\nc = { start = 1 }\n')
@@ -248,3 +271,25 @@ s = { value = "a.x + y", unit = "m" }
     rows = run(quick(tmp_path / "whole.toml", tmp_path), "erk", 1, ["a.x", "s"])
     assert abs(rows["a.x"][-1] - 3 * np.exp(-1)) < 1e-10
     assert abs(rows["s"][-1] - 4 * np.exp(-1)) < 1e-10
+
+
+def test_the_true_error_has_that_of_held_inputs(tmp_path: Path) -> None:
+    """x' = u - x with u = sin(2 pi t), held over steps of 0.1 s by the master."""
+    (tmp_path / "lag.toml").write_text(
+        'name = "Lag"\n[inputs]\nu = {}\n[states]\nx = { derivative = "u - x" }\n'
+    )
+    (tmp_path / "whole.toml").write_text(
+        'name = "Whole"\nstep = "0.1 s"\nstop = "2 s"\n[components]\na = "lag.toml"\n'
+        "[inputs]\na.u = { sines = [{ amplitude = 1, frequency = 1 }] }\n"
+    )
+    command = [*RPARM, "system", tmp_path / "whole.toml", "--exact", "--json"]
+    ended = python(*command, "--output", tmp_path / "r")
+    assert ended.returncode == 0, ended.stderr
+    (row,) = json.loads(ended.stdout)["variants"]
+    t, w = np.linspace(0, 2, 21), 2 * np.pi
+    exact = (np.sin(w * t) - w * np.cos(w * t) + w * np.exp(-t)) / (1 + w**2)
+    held = np.zeros(21)
+    for k in range(20):
+        held[k + 1] = np.exp(-0.1) * (held[k] - np.sin(w * t[k])) + np.sin(w * t[k])
+    true = np.max(np.abs(held - exact)) / np.max(np.abs(exact))
+    assert abs(row["true_error"] / true - 1) < 0.05

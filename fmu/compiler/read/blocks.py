@@ -157,6 +157,8 @@ def block(group: Group, entries: Mapping[str, Variable], matched: Mapping[str, s
     read = {name: names(entries[name].expression.tree) for name in equations}
     solved: dict[str, tuple[str, float]] = {}  # unknowns by equations with a factor for them
     for name in implicit:
+        if (entries[name].min, entries[name].max) != (None, None):
+            continue  # the search respects them
         having = (other for other in equations if name in read[other])
         for equation in sorted(having, key=lambda other: other != name):
             factor = _factor(entries[equation].expression.tree, name, implicit)

@@ -2,7 +2,8 @@
 
 import math
 from collections import ChainMap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 
@@ -151,7 +152,7 @@ class Blocks:
             if self.entries[name].section != ALGEBRAIC:
                 value = graph.value("-", value, inside[name])
             residuals.append(value)
-        with placed(self.entries[block.names[0]].place, ", ".join(block.names)):
+        with self._placed(block):
             found, block.is_linear = algebraic.solved(
                 graph,
                 block.unknowns,
@@ -185,6 +186,27 @@ class Blocks:
             self.file.anchors[name] = self.entries[name]
             return self.graph.value("anchor", name=name)
         return guess.value
+
+    @contextmanager
+    def _placed(self, block: Block) -> Iterator[None]:
+        """Name the entries of a block, with the file and the line of the first one."""
+        first, all_of = self.entries[block.names[0]], ", ".join(block.names)
+        names = [first.name, *([all_of] if len(block.names) > 1 else [])]
+        section, *_ = first.expression.place
+        owners = [(p, part) for p, part in all_parts(self.file) if first.name.startswith(p)]
+        if not owners or section == "[connections]":
+            with placed(section, *names):
+                yield
+            return
+        prefix, part = owners[-1]
+        text = part.path.read_text(encoding="utf-8")
+        names[0] = first.name.removeprefix(prefix)
+        with (
+            placed("[components]", prefix[:-1]),
+            file_reader.located(part.path, text),
+            placed(first.place, *names),
+        ):
+            yield
 
     def _text(self, name: str) -> str:
         expression = self.entries[name].expression
