@@ -57,22 +57,48 @@ static int pivot_row(int count, const double matrix[], const double scale[], int
     return found;
 }
 
-static bool factorize(int count, double matrix[], int pivot[]) {
-    if (count == 1) {
-        pivot[0] = 0;
-        return matrix[0] != 0.0 && isfinite(matrix[0]);
+/* Columns that are eliminated together, so that the rows below are read once for all of them. */
+enum { PANEL = 4 };
+
+/* Subtracts from a row, from the element `first` on, the rows of a panel times the row's factors.
+ */
+static void eliminate(int count, const double matrix[], int panel, int end, int first,
+                      double own[]) {
+    const double *f = own + panel;
+    const double *const u = matrix + (ptrdiff_t)panel * count;
+    if (end - panel == PANEL && f[0] != 0.0 && f[1] != 0.0 && f[2] != 0.0 && f[3] != 0.0) {
+        const double f0 = f[0];
+        const double f1 = f[1];
+        const double f2 = f[2];
+        const double f3 = f[3];
+        for (int j = first; j < count; j++) {
+            own[j] = own[j] - f0 * u[j] - f1 * u[j + count] - f2 * u[j + 2 * count] -
+                     f3 * u[j + 3 * count];
+        }
+        return;
     }
-    double *scale = matrix + (ptrdiff_t)count * count;
-    write_scales(count, matrix, scale);
-    for (int k = 0; k < count; k++) {
+    for (int k = 0; k < end - panel; k++) {
+        const double factor = f[k];
+        for (int j = first; factor != 0.0 && j < count; j++) {
+            own[j] -= factor * u[j + k * count];
+        }
+    }
+}
+
+/* Factorizes the columns from `panel` to `end`, of which these columns are written, and the rest of
+ * the rows with pivots. Returns false if a pivot is none. */
+static bool factorize_panel(int count, double matrix[], double scale[], int panel, int end,
+                            int pivot[]) {
+    for (int k = panel; k < end; k++) {
         const int row = pivot_row(count, matrix, scale, k);
         pivot[k] = row;
         swap_rows(count, matrix, k, row);
         scale[row] = scale[k];
-        const double *upper = matrix + (ptrdiff_t)k * count;
+        double *upper = matrix + (ptrdiff_t)k * count;
         if (upper[k] == 0.0 || !isfinite(upper[k])) {
             return false;
         }
+        eliminate(count, matrix, panel, k, end, upper);
         for (int i = k + 1; i < count; i++) {
             double *own = matrix + (ptrdiff_t)i * count;
             if (own[k] == 0.0) {
@@ -80,9 +106,28 @@ static bool factorize(int count, double matrix[], int pivot[]) {
             }
             const double factor = own[k] / upper[k];
             own[k] = factor;
-            for (int j = k + 1; j < count; j++) {
+            for (int j = k + 1; j < end; j++) {
                 own[j] -= factor * upper[j];
             }
+        }
+    }
+    return true;
+}
+
+static bool factorize(int count, double matrix[], int pivot[]) {
+    if (count == 1) {
+        pivot[0] = 0;
+        return matrix[0] != 0.0 && isfinite(matrix[0]);
+    }
+    double *scale = matrix + (ptrdiff_t)count * count;
+    write_scales(count, matrix, scale);
+    for (int panel = 0; panel < count; panel += PANEL) {
+        const int end = panel + PANEL < count ? panel + PANEL : count;
+        if (!factorize_panel(count, matrix, scale, panel, end, pivot)) {
+            return false;
+        }
+        for (int i = end; i < count; i++) {
+            eliminate(count, matrix, panel, end, end, matrix + (ptrdiff_t)i * count);
         }
     }
     return true;
