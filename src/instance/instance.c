@@ -149,20 +149,20 @@ static enum status setup(struct instance *instance) {
 
     memory->size = before_values + 2 * values_size;
     /* the inputs in front of the block: a step reads both */
-    const size_t before_block =
-        aligned((POLYNOMIAL_NODES + 1 + SERIES_INPUT_LENGTH) * input_count * sizeof(double));
-    instance->nodes = calloc(1, before_block + memory->size);
-    instance->first_derivatives = calloc(2, values_size);
+    const size_t before_block = aligned((1 + SERIES_INPUT_LENGTH) * input_count * sizeof(double));
+    const size_t nodes_size = POLYNOMIAL_NODES * input_count * sizeof(double);
+    instance->u = calloc(1, before_block + memory->size);
+    instance->first_derivatives = calloc(1, 2 * values_size + nodes_size);
     instance->reals = calloc(instance->description->reference_count, sizeof *instance->reals);
-    if (instance->nodes == NULL || instance->first_derivatives == NULL || instance->reals == NULL) {
+    if (instance->u == NULL || instance->first_derivatives == NULL || instance->reals == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
     instance->second_derivatives = instance->first_derivatives + values_size;
-    instance->u = instance->nodes + POLYNOMIAL_NODES * input_count;
+    instance->nodes = (double *)(void *)(instance->second_derivatives + values_size);
     instance->input_series = (double(*)[SERIES_INPUT_LENGTH])(instance->u + input_count);
     instance->has_avx2 =
         model->series != NULL && model->series->asks_for_avx2 && processor_has_avx2();
-    memory->block = (char *)instance->nodes + before_block;
+    memory->block = (char *)instance->u + before_block;
     memory->next_inputs = (struct polynomial *)(void *)memory->block;
     memory->current_inputs = memory->next_inputs + input_count;
     memory->active_inputs = memory->current_inputs + input_count;
@@ -230,7 +230,7 @@ void instance_destroy(struct instance *instance) {
     free(instance->indicators);
     free(instance->absolute_tolerances);
     free(instance->reals);
-    free(instance->nodes);
+    free(instance->u);
     free(instance->first_derivatives);
     free(instance);
 }

@@ -28,10 +28,10 @@ enum event_point {
 /* State of an instance: with the values in struct instance_memory, all that later results depend
  * on. A snapshot is a copy of both. */
 struct instance_state {
-    enum phase phase;
-    bool experiment_defined;
     struct instance_experiment experiment;
     struct instance_values own;
+    enum phase phase;
+    bool experiment_defined;
     struct clock_time time; /* a step writes all fields from here on, and few before */
     double drift;           /* sum of clock_step_drift over all steps, s */
 
@@ -56,9 +56,16 @@ struct instance_state {
 };
 
 /* Parts of one block of memory; a snapshot copies the block. In it the inputs stand first, in this
- * order, then largest_inputs, unhandled, restart_values and values. Here stand first what each step
- * reads. */
+ * order, then largest_inputs, unhandled, restart_values and values. Here what each step reads
+ * stands last. */
 struct instance_memory {
+    double *largest_inputs; /* largest magnitude of each so far; empty without `errors` */
+    bool *unhandled;        /* causes of the unhandled event, like triggered of struct instance */
+    char *block;
+    size_t size;                     /* bytes */
+    struct range written_at_restart; /* part of the block that a step writes besides: active_inputs
+                                        to restart_values */
+
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
     struct polynomial *active_inputs;  /* inputs since the last restart */
@@ -67,12 +74,6 @@ struct instance_memory {
                      the current time */
     struct range written; /* part of a value structure that a step writes, besides calculated values
                            */
-    double *largest_inputs; /* largest magnitude of each so far; empty without `errors` */
-    bool *unhandled;        /* causes of the unhandled event, like triggered of struct instance */
-    char *block;
-    size_t size;                     /* bytes */
-    struct range written_at_restart; /* part of the block that a step writes besides: active_inputs
-                                        to restart_values */
 };
 
 /* Place and kind of the value of a reference. */
@@ -83,9 +84,26 @@ struct instance_real {
     bool is_kept;       /* true if events keep it: in initialization mode it is calculated, too */
 };
 
-/* The fields that each step reads or writes stand first: if many instances are stepped in turn, few
- * lines of a cache are used for each. */
+/* The fields that each step reads or writes stand together, last: if many instances are stepped in
+ * turn, few lines of a cache are used for each. */
 struct instance {
+    struct message_sink sink;
+    struct ode ode;
+    double *absolute_tolerances; /* one per state, as the integrator has them; NULL if the model has
+                                    no events */
+    double *event_tolerances;    /* one per state, at its value at the last event */
+    struct indicator *indicators; /* one per indicator, since the last restart */
+    double *du;                   /* derivative of each input by the time */
+    double *z;                    /* three per indicator */
+    bool *triggered; /* one per indicator: true if it falls to 0; the last: true at a time event */
+    double *nodes;   /* POLYNOMIAL_NODES values per input, of the step that asks for them */
+    char *first_derivatives; /* value structures, along a curve (struct model) */
+    char *second_derivatives;
+    char *initial_values; /* value structure, see values.c; NULL if the model has no events */
+    struct instance_snapshot *newest; /* list of the snapshots that belong to the instance */
+    struct instance_snapshot *oldest;
+    struct instance_memory memory;
+
     const struct model_description *description;
     const struct model *model;
     struct instance_state state;
@@ -110,23 +128,6 @@ struct instance {
     struct integrator *integrator;               /* NULL without states and indicators */
     struct integrator_settings
         configured; /* last settings of the integrator, without the tolerances of the states */
-    struct instance_memory memory;
-
-    struct message_sink sink;
-    struct ode ode;
-    double *absolute_tolerances; /* one per state, as the integrator has them; NULL if the model has
-                                    no events */
-    double *event_tolerances;    /* one per state, at its value at the last event */
-    struct indicator *indicators; /* one per indicator, since the last restart */
-    double *du;                   /* derivative of each input by the time */
-    double *z;                    /* three per indicator */
-    bool *triggered; /* one per indicator: true if it falls to 0; the last: true at a time event */
-    double *nodes;   /* POLYNOMIAL_NODES values per input, of the step that asks for them */
-    char *first_derivatives; /* value structures, along a curve (struct model) */
-    char *second_derivatives;
-    char *initial_values; /* value structure, see values.c; NULL if the model has no events */
-    struct instance_snapshot *newest; /* list of the snapshots that belong to the instance */
-    struct instance_snapshot *oldest;
 };
 
 /* A saved instance: snapshot.h. */

@@ -130,21 +130,23 @@ const char *variable_type_name(enum variable_type type);
 /* Values of the variables that models have without declaring them: the time, and those of
  * *_variables.toml, by their names. */
 struct instance_values {
-    double time;                         /* s */
-    int solver_steps;                    /* internal steps since initialization */
-    int solver_rhs_evaluations;          /* evaluations of the integrator since initialization */
     double relative_tolerance;           /* 0 for the tolerance of the experiment */
-    int max_internal_steps;              /* per communication step */
     double effective_relative_tolerance; /* relative tolerance at which the integrator runs */
-    int solver_restarts;                 /* since initialization */
-    double solver_last_step;             /* length of the last internal step, s */
+    int solver_method;                   /* an enum integrator_method */
+    int max_events;                      /* per communication step */
+    double max_step;                     /* longest internal step, s; 0 without limit */
+    double last_event_time;              /* s; the start time before the first event */
+    int event_count;                     /* since initialization */
+
+    /* each step reads or writes these */
+    double time;                /* s */
+    int solver_steps;           /* internal steps since initialization */
+    int solver_rhs_evaluations; /* evaluations of the integrator since initialization */
+    int solver_restarts;        /* since initialization */
     int solver_last_order;
+    double solver_last_step; /* length of the last internal step, s */
     int solver_failed_steps; /* refused attempts since initialization */
-    int solver_method;       /* an enum integrator_method */
-    double max_step;         /* longest internal step, s; 0 without limit */
-    int event_count;         /* since initialization */
-    double last_event_time;  /* s; the start time before the first event */
-    int max_events;          /* per communication step */
+    int max_internal_steps;  /* per communication step */
 };
 
 struct instance_experiment {

@@ -7,15 +7,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* As in struct instance, the fields that each step reads or writes stand together. */
 struct integrator {
+    struct workspace workspace; /* for the memory of the method */
     struct problem problem;
-    struct workspace workspace;  /* for the memory of the method */
     const struct method *method; /* NULL if there is none */
     void *memory;                /* of the method */
     double internal_end;         /* end of the last internal step, s since the restart */
     struct integrator_statistics statistics;
 
-    /* one value per state each, parts of values, whose first are the absolute tolerances */
+    /* parts of values, one per state each, after problem.failed_x */
+    double *f; /* room for a derivative */
+    double *absolute_tolerances;
     double *reached_x; /* the state at problem.reached */
     double *x;         /* room for the state that the method writes */
     double values[];
@@ -67,9 +70,11 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     }
     created->problem.ode = *ode;
     created->problem.sink = *sink;
-    created->reached_x = created->values + n;
-    created->x = created->values + 2 * n;
-    created->problem.failed_x = created->values + 3 * n;
+    created->problem.failed_x = created->values;
+    created->f = created->values + n;
+    created->absolute_tolerances = created->values + 2 * n;
+    created->reached_x = created->values + 3 * n;
+    created->x = created->values + 4 * n;
     if (!workspace_create(&created->workspace, workspace_size(ode)) ||
         !location_create(&created->problem.ode, &created->problem.settings,
                          &created->problem.location)) {
@@ -124,10 +129,10 @@ static enum status configure(struct integrator *integrator, enum integrator_meth
 enum status integrator_configure(struct integrator *integrator,
                                  const struct integrator_settings *settings) {
     struct problem *problem = &integrator->problem;
-    memcpy(integrator->values, settings->absolute_tolerances,
+    memcpy(integrator->absolute_tolerances, settings->absolute_tolerances,
            problem->ode.state_count * sizeof(double));
     problem->settings = *settings;
-    problem->settings.absolute_tolerances = integrator->values;
+    problem->settings.absolute_tolerances = integrator->absolute_tolerances;
 
     const enum status status = configure(integrator, settings->method);
     problem->evaluation_count = 0;
@@ -328,9 +333,8 @@ static double rate_of_deviations(struct integrator *integrator, const double f[]
 /* In a stiff problem deviations change far faster than the motion does, and no explicit method can
  * make longer steps than their rate allows, however smooth the motion is. */
 bool integrator_seems_stiff(struct integrator *integrator) {
-    double *f = integrator->values + 4 * integrator->problem.ode.state_count;
-    const double of_motion = rate_of_motion(integrator, f);
-    const double of_deviations = rate_of_deviations(integrator, f);
+    const double of_motion = rate_of_motion(integrator, integrator->f);
+    const double of_deviations = rate_of_deviations(integrator, integrator->f);
     return of_deviations > 100.0 * of_motion &&
            of_deviations * integrator->statistics.last_step > 0.01;
 }

@@ -30,10 +30,6 @@ struct location_kept {
 };
 
 struct location {
-    /* Time of the event, s since the restart; INFINITY if there is none. A step without events
-     * reads only this and the indicators. */
-    double time;
-    const struct indicator *indicators; /* indicators since the restart; NULL if none is searched */
     const struct ode *ode;
     size_t *used; /* indices of the used indicators */
     size_t used_count;
@@ -60,6 +56,11 @@ struct location {
     double *first;   /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
     struct location_kept *kept;          /* by indicator */
+
+    /* A step without events reads only these: the time of the event, s since the restart, INFINITY
+     * if there is none, and the indicators since the restart, NULL if none is searched. */
+    double time;
+    const struct indicator *indicators;
 };
 
 /* Allocates all memory. Returns false if memory is short: then nothing has to be freed.

@@ -15,9 +15,9 @@
  * in s since the restart. */
 struct problem {
     struct message_sink sink;
-    /* here, where a step reads nothing */
     double *failed_x; /* the state at failed_at */
     void *observer_context;
+    struct location location;
     struct ode ode;
     struct integrator_settings settings;
     double origin;     /* time of the simulation at the restart, s: for messages only */
@@ -29,7 +29,6 @@ struct problem {
     int steps_since_settled;
     int64_t evaluation_count;      /* calls of the right-hand side, or series begun */
     integrator_observer *observer; /* NULL if there is none */
-    struct location location;
 };
 
 /* Asks the observer whether the advance ends at t, the end of an internal step with the state x. */
