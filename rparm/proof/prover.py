@@ -381,7 +381,8 @@ def _frame(framed: arb_mat, y: arb_mat) -> arb_mat:
         return arb_mat(sides.tolist())
     sides = sides * [upper(x) for x in y.entries()]
     longest = np.argsort(-np.linalg.norm(sides, axis=0))
-    return arb_mat(np.linalg.qr(sides[:, longest])[0].tolist())
+    # rounded: the last digits of LAPACK depend on the processor and on where arrays lie in memory
+    return arb_mat(np.linalg.qr(sides[:, longest])[0].astype(np.float32).tolist())
 
 
 def upper(x: arb) -> float:
