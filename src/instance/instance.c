@@ -123,9 +123,8 @@ static bool setup_events(struct instance *instance) {
         calloc(2 * state_count + count_of(model->inputs) + 3 * count + 1, sizeof(double));
     instance->indicators = calloc(count + 1, sizeof *instance->indicators);
     instance->triggered = calloc(count + 1, sizeof *instance->triggered);
-    instance->initial_values = calloc(1, aligned(model->values_size));
     if (instance->absolute_tolerances == NULL || instance->indicators == NULL ||
-        instance->triggered == NULL || instance->initial_values == NULL) {
+        instance->triggered == NULL) {
         return false;
     }
     instance->event_tolerances = instance->absolute_tolerances + state_count;
@@ -174,6 +173,12 @@ static enum status setup(struct instance *instance) {
     locate_reals(instance);
     if (model->events != NULL && !setup_events(instance)) {
         return STATUS_OUT_OF_MEMORY;
+    }
+    if (model->events != NULL || model->anchor != NULL) {
+        instance->initial_values = calloc(1, values_size);
+        if (instance->initial_values == NULL) {
+            return STATUS_OUT_OF_MEMORY;
+        }
     }
 
     if (model->states.size == 0 && instance->ode.indicator_count == 0) {

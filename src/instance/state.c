@@ -1,6 +1,7 @@
 #include "state.h"
 
 #include <math.h>
+#include <string.h>
 
 const struct variable *instance_refuse_reference(const struct instance *instance,
                                                  unsigned reference, enum variable_type type) {
@@ -23,6 +24,30 @@ enum status instance_not_finite(const struct instance *instance, const char *wha
                   "compute it",
                   what, instance->state.time.s);
     return STATUS_NOT_FINITE;
+}
+
+/* ---- Anchors -------------------------------------------------------------------------------- */
+
+/* Searches, at most, until one finds what it began at: rounding moves a solution once or twice. */
+enum { MOST_SEARCHES = 5 };
+
+void instance_move_anchors(struct instance *instance) {
+    const struct model *model = instance->model;
+    if (model->anchor == NULL) {
+        return;
+    }
+    char *values = instance->memory.values;
+    double *anchors = doubles_of(values, model->anchors);
+    double *before = doubles_of(instance->first_derivatives, model->anchors);
+    int count = 0;
+    do {
+        memcpy(before, anchors, model->anchors.size);
+        for (enum model_search search = SEARCH_FREE; search >= SEARCH_FAR; search--) {
+            model->anchor(values, instance->state.time.s, doubles_of(values, model->states),
+                          doubles_of(values, model->inputs), search, anchors);
+        }
+    } while (++count < MOST_SEARCHES && memcmp(before, anchors, model->anchors.size) != 0);
+    instance->outputs_are_valid = false;
 }
 
 /* ---- Settings ------------------------------------------------------------------------------- */

@@ -99,7 +99,7 @@ struct instance {
     double *nodes;   /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */
     char *second_derivatives;
-    char *initial_values; /* value structure, see values.c; NULL if the model has no events */
+    char *initial_values; /* value structure, see values.c; NULL if it would be memory.values */
     struct instance_snapshot *newest; /* list of the snapshots that belong to the instance */
     struct instance_snapshot *oldest;
     struct instance_memory memory;
@@ -174,19 +174,8 @@ static inline double instance_next_time(const struct instance *instance) {
 }
 
 /* Lets the searches for solutions of equations begin at those of the present values; where present
- * modes have none, at those in other modes. */
-static inline void instance_move_anchors(struct instance *instance) {
-    const struct model *model = instance->model;
-    if (model->anchor != NULL) {
-        char *values = instance->memory.values;
-        for (enum model_search search = SEARCH_FREE; search >= SEARCH_FAR; search--) {
-            model->anchor(values, instance->state.time.s, doubles_of(values, model->states),
-                          doubles_of(values, model->inputs), search,
-                          doubles_of(values, model->anchors));
-        }
-        instance->outputs_are_valid = false;
-    }
-}
+ * modes have none, at those in other modes. A search that begins there finds the same bits. */
+NONNULL void instance_move_anchors(struct instance *instance);
 
 /* Returns the number of largest_inputs. */
 static inline size_t instance_noted_inputs(const struct model *model) {

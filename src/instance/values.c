@@ -35,6 +35,7 @@ static void look_ahead(struct instance *instance) {
     instance->sink = (struct message_sink){0};
     if (instance_check_parameters(instance) == STATUS_OK &&
         instance_update_modes(instance, NULL) == STATUS_OK) {
+        instance_move_anchors(instance);
         (void)calculate(instance);
         memcpy(instance->initial_values, values, size);
     }

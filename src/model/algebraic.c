@@ -16,6 +16,9 @@ static const double noise = 4.0 * DBL_EPSILON; // of a residual, over the sizes 
 static const double most_noise = 1e-11;        // of a step, over the unknowns themselves
 static const double least_noise = 1e-15;       // over the sizes of the unknowns
 static const double large_step = 1e-2;         // likewise
+/* Of a step, beyond which quadratic convergence is not believed: far from the solution equations
+ * may be straighter than at it. */
+static const double best_shrinking = 1e-4;
 /* Of the first step, within which there is one solution: Deuflhard, theorem 2.1. */
 static const double contraction = 0.25;
 static const double off_edge = 0x1p-10; // over the size of an unknown
@@ -429,7 +432,7 @@ static enum algebraic_outcome iterate(struct newton *newton, bool is_near, doubl
             (*iterations == MOST_ITERATIONS && is_straight && of_step <= least_noise)) {
             return ALGEBRAIC_SOLVED;
         }
-        const double shrinks = *iterations > 0 ? of_step / last : INFINITY;
+        const double shrinks = *iterations > 0 ? fmax(of_step / last, best_shrinking) : INFINITY;
         if (is_within(newton, unknown, DBL_EPSILON / (shrinks * shrinks))) { // quadratically
             for (int i = 0; i < count; i++) {
                 unknown[i] += newton->step[i];

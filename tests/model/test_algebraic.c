@@ -77,6 +77,15 @@ static void diode(const double given[], bool is_free, const double i[], double r
     }
 }
 
+/* u = v + R Is (exp(v / Vt) - 1), in V: straight where v is far below 0. */
+static void junction(const double given[], bool is_free, const double v[], double r[],
+                     double slope[]) {
+    r[0] = given[0] - v[0] - 2e-9 * (exp(v[0] / 0.046) - 1.0);
+    if (slope != NULL) {
+        slope[0] = -1.0 - 2e-9 / 0.046 * exp(v[0] / 0.046);
+    }
+}
+
 /* z^2 = given */
 static void square(const double given[], bool is_free, const double z[], double r[],
                    double slope[]) {
@@ -168,6 +177,17 @@ static void test_currents_over_twelve_decades(void) {
         const double rounding = 4.0 * DBL_EPSILON * (fabs(u) + fabs(slope * i[0]));
         TEST_ASSERT_DOUBLE_WITHIN(rounding, 0.0, missed);
         TEST_ASSERT_EQUAL(ALGEBRAIC_NOT_FINITE, solved(1, diode, u, false, none).outcome);
+    }
+}
+
+/* A step from where equations are straight promises more than the next one keeps. */
+static void test_small_solutions_are_exact_from_afar_too(void) {
+    for (int k = 1; k < 100; k++) {
+        const double given = 1e-12 * k * k;
+        const double exact = given / (1.0 + 2e-9 / 0.046); // the next term is below 1e-25
+        double v[] = {-0.1 * k};
+        TEST_ASSERT_EQUAL(ALGEBRAIC_SOLVED, solved(1, junction, given, false, v).outcome);
+        TEST_ASSERT_DOUBLE_WITHIN(2e-14 * exact + 1e-24, exact, v[0]);
     }
 }
 
