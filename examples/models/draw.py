@@ -19,6 +19,8 @@ RUNS = {
     "van_der_pol": (40.0, 0.01, {"mu": 5.0}, ["x"]),
     "lorenz": (40.0, 0.01, {}, ["(x)", "z"]),
     "cart_and_pole": (10.0, 0.01, {"phi": 2.5, "m_pole": 1.0}, ["phi"]),
+    "twin_drive": (0.3, 0.001, {}, ["left.speed", "right.speed"]),
+    "rectifier": (0.06, 0.0002, {}, ["u"]),
     "dc_motor": (0.2, 0.0005, {}, ["i"]),
     "two_body_orbit": (40000.0, 50.0, {}, ["(x)", "y"]),
     "bouncing_ball": (3.0, 0.002, {}, ["h"]),
@@ -39,7 +41,7 @@ def built(name: str, folder: Path) -> Path:
     return fmu
 
 
-figure, axes = plt.subplots(3, 4, figsize=(13.5, 6.75), layout="constrained")
+figure, axes = plt.subplots(2, 7, figsize=(20, 5), layout="constrained")
 with tempfile.TemporaryDirectory() as folder:
     for axis, (name, (stop, step, start, drawn)) in zip(axes.flat, RUNS.items(), strict=True):
         fmu = built(name, Path(folder))

@@ -74,7 +74,7 @@ def example(name: str, make: Callable[[Path, Path], Path] = quick) -> Path:
     output, path = Path(BUILT.name) / name.replace("/", "_"), FOLDER / f"{name}.toml"
     output = output / make.__name__
     output.mkdir(parents=True)
-    for file in (path, path.with_suffix(".lock.toml")):
+    for file in FOLDER.glob("*.toml"):  # components of it, too
         copy(file, output)
     return make(output / path.name, output)
 

@@ -12,6 +12,7 @@ from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from scipy.special import lambertw
 
 from rparm.fmi.fmu_file import read_model
 from rparm.runs import scenario
@@ -60,6 +61,36 @@ def dc_motor(t: np.ndarray) -> dict[str, np.ndarray]:
     rest = np.linalg.solve(A, [-12.0 / L, 0.5 / ratio / J])
     moved = np.array([rest - expm(A * time) @ rest for time in t])
     return {"i": moved[:, 0], "speed": moved[:, 1]}
+
+
+def twin_drive(t: np.ndarray) -> dict[str, np.ndarray]:
+    L, k, J, d, ratio, stiffness, damping = 2e-3, 0.05, 7e-5, 1e-5, 20.0, 4.0, 0.02
+    A = np.zeros((5, 5))  # of the currents, the speeds and the twist
+    effort = np.array([0, 0, damping / ratio, -damping / ratio, stiffness])
+    for m, (R, sign) in enumerate([(1.2, -1), (1.5, 1)]):
+        A[m, [m, m + 2]] = -R / L, -k / L
+        A[m + 2, [m, m + 2]] = k / J, -d / J
+        A[m + 2] += sign * effort / ratio / J
+    A[4, 2:4] = 1 / ratio, -1 / ratio
+    rest = np.linalg.solve(A, [-12.0 / L, -12.0 / L, 0, 0, 0])
+    x = np.array([rest - expm(A * time) @ rest for time in t])
+    return {"left.speed": x[:, 2], "right.i": x[:, 1], "twist": x[:, 4], "effort": x @ effort}
+
+
+def rectifier(t: np.ndarray) -> dict[str, np.ndarray]:
+    """The current by Lambert's W: R i + V_T ln(1 + i / I_s) is the voltage at both."""
+    R, C, R_load, I_s, V_T, load = 2.0, 470e-6, 100.0, 1e-9, 46e-3, 0.05
+
+    def current(time: float, u: float) -> float:
+        at_both = 10.0 * np.sin(100 * np.pi * time) - u
+        return V_T / R * lambertw(I_s * R / V_T * np.exp((at_both + I_s * R) / V_T)).real - I_s
+
+    def motion(time: float, u: np.ndarray) -> np.ndarray:
+        return (current(time, u[0]) - u / R_load - load) / C
+
+    options = {"rtol": 1e-12, "atol": 1e-13, "max_step": 1e-4, "method": "DOP853"}
+    u = solve_ivp(motion, (0, t[-1]), [0.0], t_eval=t, **options).y[0]
+    return {"u": u, "i": np.array([current(*each) for each in zip(t, u, strict=True)])}
 
 
 MU, R0, V0 = 3.986004418e14, 7e6, 9e3
@@ -119,6 +150,8 @@ CASES = {
     "van_der_pol": (van_der_pol, 20.0, 0.5, 1e-10, {"mu": 5.0}, 0, 1e-6),
     "lorenz": (lorenz, 10.0, 0.1, 1e-13, {}, 0, 1e-9),
     "dc_motor": (dc_motor, 0.5, 0.05, 1e-10, {"torque": 0.5}, 1e-7, 1e-8),
+    "twin_drive": (twin_drive, 0.5, 0.05, 1e-10, {}, 1e-7, 1e-8),
+    "rectifier": (rectifier, 0.06, 0.001, 1e-10, {"load": 0.05}, 0, 1e-8),
     "two_body_orbit": (kepler, 2 * PERIOD, PERIOD / 8, 1e-11, {}, 0, 0.1),
     "masses": (masses, 20.0, 0.5, 1e-11, {}, 0, 1e-8),
     "pwm": (pwm, 0.02, 3.7e-4, 1e-11, {"load": 0.02}, 0, 1e-8),

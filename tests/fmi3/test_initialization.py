@@ -129,7 +129,7 @@ def fmu_of(fmu: Path, version: str, name: str) -> Path:
 
 
 OTHERS = sorted(p.stem for p in FOLDER.glob("*.toml") if not p.stem.endswith(".lock"))
-OTHERS = [n for n in OTHERS if n not in ("bouncing_ball", "dc_motor")]
+OTHERS = [n for n in OTHERS if n not in ("bouncing_ball", "rectifier")]
 
 
 @pytest.mark.parametrize("version", VERSIONS)

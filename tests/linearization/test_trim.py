@@ -13,7 +13,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import CO_SIMULATION, MODEL_EXCHANGE, Fmu
 from rparm.linearization.linear import FmuSubject, Linear, checked_point
 from rparm.linearization.trim import Trimmed, trim
-from tests.equations.examples import made
+from tests.equations.examples import example, made
 from tests.support import symbolic
 from tests.support.rparm_project import MISTAKES
 from tests.support.symbolic import ExactModel
@@ -99,10 +99,9 @@ def test_a_velocity_that_is_free_is_that_of_a_steady_motion(plant: FmuSubject) -
         trimmed(plant, ["dq1", "tau1"], f2=3.0, **given)
 
 
-def test_a_motor_under_a_voltage_turns(fmu: Path) -> None:
+def test_a_motor_under_a_voltage_turns() -> None:
     """Its load's angle follows by a gear: steady where k i = d w and u = R i + k w."""
-    path = fmu.with_name("DcMotor.fmu")
-    with Fmu(path, kind=MODEL_EXCHANGE) as opened, FmuSubject(opened) as motor:
+    with Fmu(example("dc_motor"), kind=MODEL_EXCHANGE) as opened, FmuSubject(opened) as motor:
         found = trimmed(motor, ["i", "speed"], voltage=12.0)
     w = 12.0 / (1.2 * 1e-5 / 0.05 + 0.05)
     assert (found.values["speed"], found.values["i"]) == pytest.approx((w, 2e-4 * w), rel=1e-9)

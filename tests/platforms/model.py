@@ -12,7 +12,7 @@ from pathlib import Path
 
 METHODS = (1, 2, 3, 4)  # cvode_adams, cvode_bdf, erk, taylor
 # the models that taylor, the last method, can integrate
-WITH_SERIES = ("RPManipulator", "RPPlant", "BouncingBall", "DcMotor")
+WITH_SERIES = ("RPManipulator", "RPPlant", "BouncingBall", "Rectifier")
 VARIANTS = (1, 2, 3)  # of a run
 NAMES_OF_SOLVER = ("solver_method", "max_internal_steps")
 
@@ -36,7 +36,7 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
         "seed": [7, -8, 9, 10],
     },
     "BouncingBall": {"e": 0.8, "h": 0.5, "solver_method": [1, 2, 3, 4]},
-    "DcMotor": {"R": 1.5, "i": 0.5, "solver_method": [1, 2, 3, 4]},
+    "Rectifier": {"R": 1.5, "u": 0.5, "solver_method": [1, 2, 3, 4]},
     "RPEnvironment": {"position": 0.5, "tip_x": 0.1, "stiffness": 2000.0},
     # falls onto its stops, rigid or compliant ones, slides and is held
     "RPPlant": {
