@@ -83,7 +83,7 @@ static inline void problem_settle(struct problem *problem, double t, const doubl
 static inline bool problem_has_ended(const struct problem *problem, double begin, double t) {
     const double nearest =
         fmax(PROBLEM_END * begin, 4.0 * DBL_EPSILON * fabs(problem->origin + begin));
-    return problem->ode.may_end && t >= begin && t - begin <= nearest;
+    return problem->ode.may_end && t > begin && t - begin <= nearest;
 }
 
 /* True if the method is stuck in front of a time at which the right-hand side cannot be evaluated.

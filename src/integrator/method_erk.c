@@ -79,11 +79,13 @@ static void write_cubic(const struct erk *erk, double t, const double x[],
 static void search(struct erk *erk, double t, const double x[],
                    enum status (*search_step)(struct location *)) {
     struct location *location = &erk->base.problem->location;
-    if (erk->search_status == STATUS_OK) {
+    const bool is_active = location_is_active(location);
+    if (is_active && erk->search_status == STATUS_OK) {
         write_cubic(erk, t, x, location);
         erk->search_status = search_step(location);
     }
-    erk->is_cut_short = erk->search_status != STATUS_OK || location->time <= erk->end;
+    erk->is_cut_short =
+        erk->search_status != STATUS_OK || (is_active && location->time <= erk->end);
 }
 
 /* True if the begin of each internal step is kept: to search it, or to go back to it. */
@@ -127,9 +129,7 @@ static int observe(sunrealtype t, N_Vector x, void *user_data) {
         } else {
             erk->search_status = problem_rhs(erk->base.problem, t, small_vector_data(x), erk->dx);
         }
-        if (location_is_active(&problem->location)) {
-            search(erk, t, small_vector_data(x), location_search);
-        }
+        search(erk, t, small_vector_data(x), location_search);
         if (!erk->is_cut_short) {
             const size_t size = problem->ode.state_count * sizeof(double);
             erk->step_begin = t;

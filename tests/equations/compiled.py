@@ -32,7 +32,7 @@ WORDS_OF_EVENTS += [f"{part}_{key}" for part in ("modes", "discrete_states", "di
                     for key in ("offset", "size")]  # fmt: skip
 WORDS_OF_EVENTS += ["starts_follow", "next_time"]
 WORDS += ["right_hand_side", "jacobian", "band", "series", "outputs", "derivatives", "check"]
-WORDS += ["events"]
+WORDS += ["events", "anchors_offset", "anchors_size"]
 
 
 class Words(ctypes.Structure):

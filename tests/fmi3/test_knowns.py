@@ -29,7 +29,8 @@ MOVED |= {"Ki1": 0.8, "Ki2": 0.9}
 MOVED |= {"armature1": 0.2, "armature2": 0.3, "damping1": 0.4, "damping2": 0.3}
 MOVED |= {"coulomb_friction1": 0.6, "coulomb_friction2": 0.5}
 MOVED |= {"breakaway_friction1": 0.9, "breakaway_friction2": 0.8}
-MOVED |= {"L": 0.5}  # from where a derivative is far from constant over the difference
+# from where a derivative is far from constant over the difference
+MOVED |= {"L": 0.5, "frequency": 0.1, "I_s": 0.1, "V_T": 0.5}
 MOVED |= {"stribeck_velocity1": 0.8, "stribeck_velocity2": 0.9}
 
 

@@ -2,6 +2,7 @@
 there before. The plant: test_plant_model.py; calls of FMI: fuzz/fuzz_hostile.c."""
 
 from pathlib import Path
+from shutil import copy
 
 import numpy as np
 import pytest
@@ -25,6 +26,8 @@ def written(words: Words, holds: int, fill: float) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_results_do_not_depend_on_what_stood_there(name: str, tmp_path: Path) -> None:
+    for component in FOLDER.glob("*.toml"):
+        copy(component, tmp_path)
     model = Model(tmp_path, (FOLDER / f"{name}.toml").read_text(encoding="utf-8"), "-w")
     for holds in (0, 1):
         one, other = (written(model.words, holds, fill) for fill in (np.nan, 0.0))

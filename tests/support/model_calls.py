@@ -48,7 +48,7 @@ def part(words: ctypes.Structure, name: str) -> slice:
 def known_words(words: Words) -> np.ndarray:
     """True where the value structure has what is given: not calculated."""
     known, events = np.zeros(-(-words.size // 8), dtype=bool), events_of(words)
-    for name in "pux":
+    for name in (*"pux", "anchors"):
         known[part(words, name)] = True
     for name in ("discrete_states", "discrete_inputs", "modes") if events else ():
         known[part(events, name)] = True
