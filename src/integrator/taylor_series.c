@@ -186,8 +186,10 @@ static inline double missed(double derivative, double of_polynomial) {
     return difference <= 0.0 ? 0.0 : difference;
 }
 
-/* Part of the way of a solution by which its series may miss it. */
+/* By how much the series of a solution may miss it: a part of its way, and, over its size, the
+ * tolerance or what ill-conditioned equations leave to rounding. */
 static const double most_missed = 1e-2;
+static const double ill_conditioned = 1e-8;
 
 /* True if the solutions of equations at s are those to which the series lead, not others. */
 static bool is_continued(const struct taylor_series *series, double s) {
@@ -201,8 +203,11 @@ static bool is_continued(const struct taylor_series *series, double s) {
             way = (way + fabs(row[order])) * s;
         }
         const double found = series->end_row[rows->solutions[k]][0] - row[0];
+        const double size = fmax(fabs(row[0]), rows->solution_sizes[k]);
+        const double tolerance =
+            fmax(series->problem->settings.relative_tolerance, ill_conditioned) * size;
         const bool is_read = isfinite(row[0]) != 0; // else the motion would not be finite, either
-        if (is_read && !(fabs(found - expected) <= most_missed * way + 1e-12 * fabs(row[0]))) {
+        if (is_read && !(fabs(found - expected) <= most_missed * way + tolerance)) {
             return false;
         }
     }

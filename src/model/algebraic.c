@@ -15,6 +15,7 @@ enum {
 static const double noise = 4.0 * DBL_EPSILON; // of a residual, over the sizes of its terms
 static const double most_noise = 1e-11;        // of a step, over the unknowns themselves
 static const double least_noise = 1e-15;       // over the sizes of the unknowns
+static const double large_noise = 1e-6;        // likewise, of ill-conditioned equations
 static const double large_step = 1e-2;         // likewise
 /* Of a step, beyond which quadratic convergence is not believed: far from the solution equations
  * may be straighter than at it. */
@@ -194,6 +195,8 @@ struct newton {
     bool is_free;
     double *matrix, *next; /* slopes at the last iterate, factorized, and at the next one */
     double *residual, *step, *ahead, *trial, *size, *before;
+    double *rounding; /* of the residuals at the last iterate */
+    double *room;     /* three vectors */
     int *pivot;
 };
 
@@ -231,16 +234,17 @@ static bool evaluate(const struct newton *newton, const double unknown[]) {
     return isfinite(size) && sum == 0.0;
 }
 
-/* True if each residual is as small as the rounding of its terms. */
+/* True if each residual is as small as the rounding of its terms, which it writes. */
 static bool is_rounding(const struct newton *newton, const double unknown[]) {
     const int count = newton->system->count;
     bool found = true;
-    for (int i = 0; found && i < count; i++) {
+    for (int i = 0; i < count; i++) {
         double size = 0.0;
         for (int j = 0; j < count; j++) {
             size += fabs(newton->next[i * count + j] * unknown[j]);
         }
-        found = newton->residual[i] == 0.0 || fabs(newton->residual[i]) <= noise * size;
+        newton->rounding[i] = noise * size;
+        found &= newton->residual[i] == 0.0 || fabs(newton->residual[i]) <= noise * size;
     }
     return found;
 }
@@ -272,9 +276,22 @@ static bool is_within(const struct newton *newton, const double unknown[], doubl
     return found;
 }
 
+/* True if the rounding of residuals moves the solution by as much as the step. */
+static bool is_noise(const struct newton *newton) {
+    const int count = newton->system->count;
+    double *bound = newton->room + (ptrdiff_t)2 * count;
+    bool found = true;
+    algebraic_bounds(count, newton->matrix, newton->pivot, newton->rounding, newton->room, bound);
+    for (int i = 0; i < count; i++) {
+        found &= fabs(newton->step[i]) <= bound[i];
+    }
+    return found;
+}
+
 /* True if rounding may hide whether a step leads nearer to the solution. */
 static bool is_small(const struct newton *newton, const double unknown[], double of_step) {
-    return is_within(newton, unknown, most_noise) || of_step <= least_noise;
+    return is_within(newton, unknown, most_noise) || of_step <= least_noise ||
+           (of_step <= large_noise && is_noise(newton));
 }
 
 /* True if the slopes have not changed over the last step: what is left is rounding, or a long way,
@@ -470,6 +487,8 @@ struct algebraic_report algebraic_solve(const struct algebraic *system, struct a
         .trial = room.vector + (ptrdiff_t)3 * count,
         .size = room.vector + (ptrdiff_t)4 * count,
         .before = room.vector + (ptrdiff_t)5 * count,
+        .rounding = room.vector + (ptrdiff_t)6 * count,
+        .room = room.vector + (ptrdiff_t)7 * count,
         .pivot = room.pivot,
     };
     struct algebraic_report report = {.iterations = 0};

@@ -33,7 +33,7 @@ struct algebraic_room {
 
 #define ALGEBRAIC_ROOM(count)                                                                      \
     (struct algebraic_room) {                                                                      \
-        (double[2 * (count) * ((count) + 1)]){0}, (double[6 * (count)]){0}, (int[count]) {         \
+        (double[2 * (count) * ((count) + 1)]){0}, (double[10 * (count)]){0}, (int[count]) {        \
             0                                                                                      \
         }                                                                                          \
     }

@@ -177,8 +177,10 @@ struct series {
     const struct series_inner *inner;
     size_t inner_count, inner_stride;
 
-    /* Rows of solutions of equations, which another solution may replace where a step ends. */
+    /* Rows of solutions of equations, which another solution may replace where a step ends, and the
+     * nominal values of these. */
     const size_t *solutions;
+    const double *solution_sizes;
     size_t solution_count;
 };
 

@@ -245,7 +245,7 @@ def _series(file: ModelFile, series: Series, has_domains: bool) -> dict[str, obj
         "may_vanish": str(series.may_vanish).lower(),
         "is_of_time": str(series.is_of_time).lower(),
         "inner_count": len(inner),
-        "solutions_of_series": _solutions(series, ".solutions"),
+        "solutions_of_series": [*_solutions(series, ".solutions"), *_sizes(series)],
         "inner_stride": len(series.columns) or 1,
     }
 
@@ -257,6 +257,12 @@ def _solutions(series: Series, member: str) -> list[str]:
         return []
     numbers = ", ".join(map(str, rows))
     return [f"{member} = (const size_t[]){{{numbers}}},", f".solution_count = {len(rows)},"]
+
+
+def _sizes(series: Series) -> list[str]:
+    """Return the member of struct series for the nominal values of solutions."""
+    sizes = ", ".join(map(repr, series.solutions().values()))
+    return [f".solution_sizes = (const double[]){{{sizes}}},"] if sizes else []
 
 
 def _may_end(file: ModelFile) -> bool:

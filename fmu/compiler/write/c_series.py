@@ -196,12 +196,14 @@ class Series:
         """What may be nothing at the begin of a step and large within, and its argument."""
         return [f"{{{self._place(value)}, {self._place(x)}}}" for value, x in self._inner()]
 
-    def solutions(self) -> list[int]:
-        """Rows of unknowns that Newton's method finds."""
-        return [
-            i for value, i in self.rows.items()
+    def solutions(self) -> dict[int, float]:
+        """Rows of unknowns that Newton's method finds, and their nominal values."""
+        systems = self.graph.systems
+        return {
+            i: systems[value.arguments[0].name].nominal[int(value.name)]
+            for value, i in self.rows.items()
             if value.op == "component" and value.arguments[0].op == "solution"
-        ]  # fmt: skip
+        }
 
     def _inner(self) -> list[tuple[Value, Value]]:
         if self.is_limited:
