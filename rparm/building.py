@@ -69,7 +69,7 @@ def build(
 
 def is_equations(file: Path) -> bool:
     """Return whether a file .toml has equations, and no system; UserError if it cannot be read."""
-    found = set(read_toml(file)) if Path(file).suffix.lower() == EQUATIONS else set()
+    found = read_toml(file) if Path(file).suffix.lower() == EQUATIONS else {}
     return project.is_of("build", found) and not project.is_system(found)
 
 

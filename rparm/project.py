@@ -29,7 +29,7 @@ import os
 import platform
 import re
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -60,6 +60,7 @@ NO_CACHE = "RPARM_NO_CACHE"  # variable of the environment, which --no-cache set
 
 EQUATIONS = {"states", "discrete", "sampled", "algebraic", "where", "outputs"}
 EQUATIONS |= {"experiment", "modes"}
+VARIABLE = re.compile(r"\s*\w+(\.\w+|\[[\d,\s]+\])+\s*")
 OF_LOOP = {"start", "stop", "step", "keep", "variants"}  # keys of systems of components only
 # command -> the files that it takes, and keys that such a file has and others do not
 KINDS = {
@@ -116,10 +117,18 @@ def is_of(command: str, content: Iterable[str]) -> bool:
     return not KINDS[command][1].isdisjoint(content)
 
 
-def is_system(content: Iterable[str]) -> bool:
+def is_system(content: Mapping[str, object]) -> bool:
     """Return whether a file describes components that run side by side, not one model of them."""
     keys = {*content}
-    return is_of("system", keys) and bool(OF_LOOP & keys or not EQUATIONS & keys)
+    has_equations = bool(EQUATIONS & keys) or _has_expressions(content.get("connections"))
+    return is_of("system", keys) and bool(OF_LOOP & keys or not has_equations)
+
+
+def _has_expressions(connections: object) -> bool:
+    """Return whether more is connected than a variable with a variable."""
+    if isinstance(connections, dict):
+        return any(map(_has_expressions, connections.values()))
+    return isinstance(connections, str) and not VARIABLE.fullmatch(connections)
 
 
 def refuse_other(path: Path, content: Iterable[str], command: str) -> None:

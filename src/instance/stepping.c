@@ -301,11 +301,14 @@ static enum status advance_by_restarts(struct step *step) {
         const enum status status =
             step->options->accept == NULL ? advance(step) : advance_observed(step);
         const bool may_be_lost = status == STATUS_NOT_FINITE || status == STATUS_NO_CONVERGENCE;
-        if (!may_be_lost || !instance->ode.may_end || steps_left(step) <= 0) {
+        if (!may_be_lost || !instance->ode.may_end) {
             return status;
         }
         if (instance->model->anchor == NULL || state->latest_time <= 0.0) {
             return ends_at_limit(step) ? STATUS_OK : status;
+        }
+        if (steps_left(step) <= 0) {
+            return STATUS_TOO_MANY_STEPS;
         }
         instance_note_part(instance, status, false); // moves the instance there
         move_inputs(instance, clock_difference(state->time, step->begin));

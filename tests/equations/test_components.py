@@ -74,10 +74,7 @@ def test_components_have_the_bits_of_one_file(tmp_path: Path) -> None:
             np.testing.assert_array_equal(parts[name], one[other], err_msg=f"{method}: {name}")
 
 
-def test_a_loop_file_becomes_one_fmu(tmp_path: Path) -> None:
-    """Its parameters are starts, its stop is the end of the experiment; a lock file is written."""
-    texts = MODELS["hydraulics"]
-    loop = """
+LOOP = """
 name = "Loop"
 step = "10 ms"
 stop = "3 s"
@@ -98,7 +95,12 @@ right.A = 4
 [variants.other]
 left.h = 3
 """
-    path = written(tmp_path, texts, whole=loop)
+
+
+def test_a_loop_file_becomes_one_fmu(tmp_path: Path) -> None:
+    """Its parameters are starts, its stop is the end of the experiment; a lock file is written."""
+    texts = MODELS["hydraulics"]
+    path = written(tmp_path, texts, whole=LOOP)
     ended = python(*RPARM, "build", path, "--output", tmp_path, "--json")
     assert ended.returncode == 0, ended.stderr
     description = fmpy.read_model_description(tmp_path / "Loop.fmu")
@@ -113,6 +115,26 @@ left.h = 3
     ended = python(*RPARM, "build", path, "--output", tmp_path, "--json")
     starts = fmpy.read_model_description(tmp_path / "Loop.fmu").modelVariables
     assert next(v.start for v in starts if v.name == "right.h") == "7.0"
+
+
+OF_LOOPS = [
+    ("[connections]", "[conections]", "unknown key 'conections', did you mean 'connections'?"),
+    ('step = "10 ms"', 'step = "10 msec"', "line 3: step: unit 'msec'"),
+    ('["left.h"]', '["left.hh"]', "keep: 'left.hh': there is no such variable"),
+    ('"right.inflow" =', '"left.inflow" =', "[inputs]: left.inflow: is connected already"),
+    ('"right.inflow" =', '"right.p" =', "[inputs]: right.p: is of [outputs], no input"),
+    ('"right.inflow" =', '"right.inflw" =', "right.inflw: there is no such variable, did you mean"),
+    ("left.h = 3", "left.hh = 3", "[variants.other]: left.hh: there is no such variable"),
+    ('left = "tank.toml"', 'left = "tank"', "left: tank: only files with equations (.toml) can"),
+    ('pipe = "pipe.toml"', 'pipe = "pipe.toml"\nder_left = "tank.toml"', "der_left.h: derivatives"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), OF_LOOPS, ids=[m for *_, m in OF_LOOPS])
+def test_a_mistake_in_a_loop_file(old: str, new: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ModelFileError) as refused:
+        read(written(tmp_path, MODELS["hydraulics"], whole=LOOP.replace(old, new)))
+    assert message in str(refused.value) and "\n" not in str(refused.value)
 
 
 WHOLE = MODELS["hydraulics"]["whole"]

@@ -36,6 +36,8 @@ from .keys import NAME, entries
 
 EQUATIONS = ".toml"
 LOOP = ("start", "step", "stop", "keep", "variants")  # keys that only loop files have
+OF_LOOP = ("name", "description", "components", "connections", "inputs", "parameters", *LOOP)
+RUN = (".fmu", ".ssp", ".py")  # files that only `system` takes
 MOST_LEVELS = 20
 FREE = ("time", *CONSTANTS)  # names that every file has
 QUANTITY = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
@@ -62,10 +64,14 @@ def of_loop(tables: Mapping[str, Any]) -> dict[str, Any]:
     """
     if not any(key in tables for key in LOOP):
         return dict(tables)
+    for key in tables:
+        if key not in OF_LOOP:
+            raise ModelFileError(f"unknown key {shown(key)}{meant(key, OF_LOOP)}")
     found = {key: tables[key] for key in ("name", "description") if key in tables}
-    times = {key: tables[key] for key in ("stop", "step") if key in tables}
-    with placed("[experiment]"):
-        found["experiment"] = {key: _seconds(value) for key, value in times.items()}
+    times = found["experiment"] = {}
+    for key in ("stop", "step"):
+        with placed(key):
+            times |= {key: _seconds(tables[key])} if key in tables else {}
     given: dict[str, dict[str, Any]] = {}
     with placed("[parameters]"):
         for name, value in flattened(tables.get("parameters", {})).items():
@@ -77,7 +83,9 @@ def of_loop(tables: Mapping[str, Any]) -> dict[str, Any]:
     if missing := given.keys() - files.keys():
         raise ModelFileError(f"[parameters]: no component {min(missing)!r}")
     found["components"] = {
-        name: {"file": file, "parameters": given.get(name, {})} for name, file in files.items()
+        name: (file if isinstance(file, dict) else {"file": file})
+        | {"parameters": given.get(name, {})}
+        for name, file in files.items()
     }
     return found | {"connections": tables.get("connections", {})}
 
@@ -89,6 +97,43 @@ def _seconds(value: object) -> object:
     if not number:
         raise ModelFileError(f"expected a time such as '10 ms', got {shown(value)}")
     return parsed(unit or "s").value(float(number))
+
+
+def check_loop(tables: Mapping[str, Any], file: ModelFile) -> None:
+    """Check the names in a loop file of what only `system` uses: signals, variants, `keep`."""
+    if not any(key in tables for key in LOOP):
+        return
+    for name in _ends(tables.get("inputs", {})):
+        with placed("[inputs]", name):
+            variable = _known(name, file)
+            if variable.section not in ("inputs", SWITCHES):
+                of = variable.expression
+                is_fed = of is not None and of.place[0] == "[connections]"
+                what = "connected already" if is_fed else f"of {variable.place}, no input"
+                raise ModelFileError(f"is {what}")
+    for variant, given in tables.get("variants", {}).items():
+        for name in flattened(given) if isinstance(given, dict) else ():
+            with placed(f"[variants.{variant}]", name):
+                if name not in ("description", "file"):
+                    _known(name, file)
+    for name in tables.get("keep", ()):
+        with placed("keep", shown(name)):
+            _known(name, file)
+
+
+def _known(name: str, file: ModelFile) -> Variable:
+    if name not in file.variables:
+        raise ModelFileError(f"there is no such variable{meant(name, file.variables)}")
+    return file.variables[name]
+
+
+def _ends(given: Mapping[str, Any], begin: str = "") -> Iterator[str]:
+    """Yield names of [inputs], whose entries are tables themselves."""
+    for key, value in given.items():
+        if isinstance(value, dict) and any(isinstance(inner, dict) for inner in value.values()):
+            yield from _ends(value, f"{begin}{key}.")
+        else:
+            yield f"{begin}{key}"
 
 
 class Components:
@@ -123,8 +168,9 @@ class Components:
         if not isinstance(given, str):
             raise ModelFileError(f"expected a file with equations, got {shown(given)}")
         if not given.lower().endswith(EQUATIONS):
-            what = "only files with equations (.toml) can be built in; `system` runs it"
-            raise ModelFileError(f"{given}: {what}")
+            way_out = "; `system` runs it" if given.lower().endswith(RUN) else ""
+            what = f"only files with equations (.toml) can be built in{way_out}"
+            raise ModelFileError(f"{given or shown(given)}: {what}")
         path = self.file.path.parent / given
         if path.resolve() in self.above or len(self.above) > MOST_LEVELS:
             raise ModelFileError(f"{given} contains itself")
@@ -185,7 +231,9 @@ class Components:
             variable.initial = None
             low = -float("inf") if variable.min is None else variable.min
             high = float("inf") if variable.max is None else variable.max
-            if variable.is_real and not low <= variable.start <= high:
+            if not (variable.is_real or variable.kind == WHOLE):
+                return
+            if not low <= variable.start <= high:
                 raise ModelFileError(f"{variable.start:g} is outside [min, max]")
 
     def _number(self, variable: Variable, value: object) -> float | bool | int:
@@ -245,6 +293,10 @@ class Components:
     def check_names(self) -> None:
         """Check that different names are different in C."""
         known: dict[str, str] = {}
+        rates = [f"der_{state.name}" for state in self.file.of("states")]
+        for name in rates:
+            if name in self.file.variables:
+                raise ModelFileError(f"{name}: derivatives of states begin with der_: change it")
         for name in (*self.file.variables, *self.file.modes, *self.file.happening):
             other = known.setdefault(c_name("", name), name)
             if other != name:

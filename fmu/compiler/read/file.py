@@ -21,7 +21,7 @@ from ..units import ANGLE, BASE, Unit
 from . import header, keys, terminals
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
-from .components import Components, of_loop
+from .components import Components, check_loop, of_loop
 from .content import (
     BOOLEAN,
     CALCULATED,
@@ -474,6 +474,8 @@ def _check_dimensions(name: str, base: str, file: ModelFile) -> None:
 def _check_range(variable: Variable) -> None:
     low = -math.inf if variable.min is None else variable.min
     high = math.inf if variable.max is None else variable.max
+    if low > high:
+        raise ModelFileError(f"min = {low:g} is above max = {high:g}")
     if variable.start is not None and not low <= variable.start <= high:
         raise ModelFileError(f"start = {variable.start:g} is outside [min, max]")
     if variable.nominal is not None and not variable.nominal > 0:
@@ -593,8 +595,9 @@ def read(path: Path, above: tuple[Path, ...] = ()) -> ModelFile:
     with placed(path):
         source = source_of(path)
     with located(path, source.text):
-        source = replace(source, tables=of_loop(source.tables))
-        file = read_tables(source, solver_names(), above=above)
+        equations = replace(source, tables=of_loop(source.tables))
+        file = read_tables(equations, solver_names(), above=above)
+        check_loop(source.tables, file)
         file.sources = [each.path for each in source.all()]
         for part in file.parts.values():
             file.sources += [path for path in part.sources if path not in file.sources]

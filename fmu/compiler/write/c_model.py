@@ -377,7 +377,7 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[Field, Value
 
 def _message(file: ModelFile, code: Code, given: str) -> tuple[Operand, ...]:
     """Format and arguments of a message, in which values stand in the place of {NAME}."""
-    parts = re.split(r"\{(\w+(?:\[[0-9,]+\])?)\}", given)
+    parts = re.split(r"\{((?:\w+\.)*\w+(?:\[[0-9,]+\])?)\}", given)
     form, arguments = parts[0].replace("%", "%%"), []
     for name, rest in zip(parts[1::2], parts[2::2], strict=True):
         variable, shown = file.variables.get(name), f"{{{name}}}"
