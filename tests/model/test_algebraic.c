@@ -77,10 +77,10 @@ static void diode(const double given[], bool is_free, const double i[], double r
     }
 }
 
-/* u = v + R Is (exp(v / Vt) - 1), in V: straight where v is far below 0. */
+/* u = v + R Is (e^(v / Vt) - 1), in V: straight where v is far below 0. */
 static void junction(const double given[], bool is_free, const double v[], double r[],
                      double slope[]) {
-    r[0] = given[0] - v[0] - 2e-9 * (exp(v[0] / 0.046) - 1.0);
+    r[0] = given[0] - v[0] - 2e-9 * expm1(v[0] / 0.046);
     if (slope != NULL) {
         slope[0] = -1.0 - 2e-9 / 0.046 * exp(v[0] / 0.046);
     }
