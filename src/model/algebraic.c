@@ -9,6 +9,7 @@ enum {
     MOST_ITERATIONS = 200, /* to an edge they halve the distance at best */
     MOST_NEAR = 10,        /* iterations to a solution that is near */
     MOST_HALVINGS = 30,    /* of a step */
+    MOST_PARTS = 64,       /* of a path to a solution, found or not */
     MOST_SHOWN = 120,      /* characters of names or equations in a message */
 };
 
@@ -22,8 +23,9 @@ static const double large_step = 1e-2;         // likewise
 static const double best_shrinking = 1e-4;
 /* Of the first step, within which there is one solution: Deuflhard, theorem 2.1. */
 static const double contraction = 0.25;
-static const double off_edge = 0x1p-10; // over the size of an unknown
-static const double straight = 1e-6;    // change of a step by that of the slopes, over the step
+static const double shortest_part = 0x1p-16; // of a path
+static const double off_edge = 0x1p-10;      // over the size of an unknown
+static const double straight = 1e-6; // change of a step by that of the slopes, over the step
 static const double jump = 1e-6; // of a residual whose sign changes, over its values at the bounds
 
 /* ---- Linear equations ----------------------------------------------------------------------- */
@@ -197,6 +199,8 @@ struct newton {
     double *residual, *step, *ahead, *trial, *size, *before;
     double *rounding; /* of the residuals at the last iterate */
     double *room;     /* three vectors */
+    double *first; /* residuals at the guess, and how much of them is left on the path from there */
+    double left;
     int *pivot;
 };
 
@@ -226,6 +230,7 @@ static bool evaluate(const struct newton *newton, const double unknown[]) {
     newton->system->evaluate(newton->given, newton->is_free, unknown, newton->residual,
                              newton->next);
     for (int i = 0; i < count; i++) {
+        newton->residual[i] -= newton->left > 0.0 ? newton->left * newton->first[i] : 0.0;
         size += fabs(newton->residual[i]);
     }
     for (int i = 0; size > 0.0 && i < count * count; i++) {
@@ -471,6 +476,34 @@ static enum algebraic_outcome iterate(struct newton *newton, bool is_near, doubl
     }
 }
 
+/* Follows the solutions of residuals that go from those at the guess to 0: Newton's homotopy, in
+ * parts so short that each leads to the one solution near the last. Returns false if it ends, as
+ * where equations are singular. end: room for unknowns. */
+static bool follow(struct newton *newton, double unknown[], double end[], int *iterations) {
+    const int count = newton->system->count;
+    double part = 0.5;
+    double left = 1.0;
+    if (!evaluate(newton, unknown)) {
+        return false;
+    }
+    copy(count, newton->residual, newton->first);
+    for (int parts = 0; left > 0.0 && part >= shortest_part && parts < MOST_PARTS; parts++) {
+        int more = 0;
+        newton->left = left > part ? left - part : 0.0;
+        copy(count, unknown, end);
+        if (iterate(newton, true, end, &more) == ALGEBRAIC_SOLVED) {
+            copy(count, end, unknown);
+            left = newton->left;
+            part *= 2.0;
+        } else {
+            part *= 0.5;
+        }
+        *iterations += more;
+    }
+    newton->left = 0.0;
+    return left == 0.0;
+}
+
 struct algebraic_report algebraic_solve(const struct algebraic *system, struct algebraic_room room,
                                         const double given[], bool is_near, bool is_free,
                                         double unknown[]) {
@@ -489,10 +522,17 @@ struct algebraic_report algebraic_solve(const struct algebraic *system, struct a
         .before = room.vector + (ptrdiff_t)5 * count,
         .rounding = room.vector + (ptrdiff_t)6 * count,
         .room = room.vector + (ptrdiff_t)7 * count,
+        .first = room.vector + (ptrdiff_t)10 * count,
         .pivot = room.pivot,
     };
+    double *guess = room.vector + (ptrdiff_t)11 * count;
     struct algebraic_report report = {.iterations = 0};
+    copy(count, unknown, guess);
     report.outcome = iterate(&newton, is_near, unknown, &report.iterations);
+    if (report.outcome == ALGEBRAIC_FAR && is_near &&
+        follow(&newton, guess, unknown, &report.iterations)) {
+        report.outcome = ALGEBRAIC_SOLVED;
+    }
     if (report.outcome == ALGEBRAIC_NOT_FINITE && system->has_modes && !is_free) {
         newton.is_free = true;
         report.outcome = iterate(&newton, false, unknown, &report.iterations);

@@ -33,7 +33,7 @@ struct algebraic_room {
 
 #define ALGEBRAIC_ROOM(count)                                                                      \
     (struct algebraic_room) {                                                                      \
-        (double[2 * (count) * ((count) + 1)]){0}, (double[10 * (count)]){0}, (int[count]) {        \
+        (double[2 * (count) * ((count) + 1)]){0}, (double[12 * (count)]){0}, (int[count]) {        \
             0                                                                                      \
         }                                                                                          \
     }
@@ -52,9 +52,9 @@ struct algebraic_report {
 };
 
 /* Solves the system from the guess in `unknown`, which gets the solution, or NAN if there is none.
- * is_near: only a solution counts that the method reaches without damping. is_free: as of evaluate.
- * In given modes a guess may be where the equations are not finite; then the search begins at the
- * solution in free modes. */
+ * is_near: only the solution counts to which a path leads while the guess's residuals go to 0.
+ * is_free: as of evaluate. In given modes a guess may be where the equations are not finite; then
+ * the search begins at the solution in free modes. */
 struct algebraic_report algebraic_solve(const struct algebraic *system, struct algebraic_room room,
                                         const double given[], bool is_near, bool is_free,
                                         double unknown[]);

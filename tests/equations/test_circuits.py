@@ -102,6 +102,18 @@ def test_a_rectifier(text: str, reference: Callable[[np.ndarray], np.ndarray], s
             np.testing.assert_allclose(run["v"], exact, atol=20 * tolerance + 1e-8)
 
 
+@pytest.mark.parametrize("method", ["cvode_adams", "cvode_bdf", "erk"])
+def test_an_anchor_costs_no_steps(method: str) -> None:
+    """A guess that knows the circuit needs as many: a far solution is found along a path."""
+    guess = 'a = { start = "min(source, v + 0.6)", '
+    counts = []
+    for text in (HALF_WAVE, HALF_WAVE.replace("a = { ", guess).replace("HalfWave", "Guess")):
+        start = {"solver_method": METHODS[method]}
+        run = simulated(made(text), 1.4, 0.1, start, relative_tolerance=1e-8, also=["solver_steps"])
+        counts.append(run["solver_steps"][-1])
+    assert counts[0] <= 1.2 * counts[1], counts
+
+
 def test_a_time_event_without_a_search() -> None:
     """Nothing but the time ends a step: x' = -z, then 1 - z, where z + z^3 = x."""
     text = """
