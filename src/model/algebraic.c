@@ -588,10 +588,11 @@ bool algebraic_fails(const struct algebraic *system, struct algebraic_room room,
         return true;
     case ALGEBRAIC_SINGULAR:
         (void)snprintf(text, size,
-                       "%.*s%s: no solution at t = %.17g, the equations are singular with largest "
-                       "residual %.3g after %d iterations: %.*s",
-                       MOST_SHOWN, system->names, more, t, report.residual, report.iterations,
-                       MOST_SHOWN, system->equations);
+                       "%.*s%s: no solution at t = %.17g, the equations are singular%s with "
+                       "largest residual %.3g after %d iterations: %.*s",
+                       MOST_SHOWN, system->names, more, t,
+                       report.iterations == 0 ? " at the guess (give another start)" : "",
+                       report.residual, report.iterations, MOST_SHOWN, system->equations);
         return true;
     case ALGEBRAIC_FAR:
         (void)snprintf(
