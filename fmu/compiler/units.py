@@ -61,13 +61,19 @@ class Unit:
         return (self.factor, self.offset) != (1, 0)
 
     def value(self, number: float | str, is_difference: bool = False) -> float:
-        """Return the value of a finite number, or a literal; a difference has no offset."""
+        """Return the value of a finite number, or a literal; a difference has no offset.
+
+        ValueError if it is no double.
+        """
         if not self.offset and abs(self.factor - DEGREE) <= SAME * DEGREE:
             return math.radians(float(number))
         # only 0 may have an exponent of any size
         exact = Fraction(str(number)) if float(number) else Fraction(0)
         exact = exact * self.factor + (0 if is_difference else self.offset)
-        return float(exact) if exact else math.copysign(0.0, float(number))
+        try:
+            return float(exact) if exact else math.copysign(0.0, float(number))
+        except OverflowError:
+            raise ValueError(f"{number} is too large") from None
 
     def of(self, other: "Unit") -> "Unit":
         """Return this unit with its values in another one; ValueError if that cannot be."""

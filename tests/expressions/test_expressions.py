@@ -14,7 +14,7 @@ from rparm.fmu_tools.compiler.expressions.expression import (
     names,
     written,
 )
-from rparm.fmu_tools.compiler.expressions.kinds import CONDITION, with_kinds
+from rparm.fmu_tools.compiler.expressions.kinds import CONDITION, WHOLE, kind_of, with_kinds
 from rparm.fmu_tools.compiler.expressions.parser import parse, parsed
 
 VALUES = {"x": 0.75, "y": -1.25, "z": 3.0}
@@ -96,6 +96,7 @@ def test_a_branch_that_is_not_taken_need_not_have_a_value() -> None:
         ("a @ b", 3), ("a == b", 3), ("a // b", 4), ("'a'", 1), ("a[b]", 3), ("1e999", 1),
         ("1 + True", 5), ("lambda: 1", 7), ("(" * 200, 102), ("-" * 200 + "1", 102), ("a.", 2),
         ("1 + (2 < 3)", 8), ("x if y else z", 6), ("not (1 < 2) + 3", 8), ("1 < 2", 3),
+        ("2[rad]s", 7), ("2[rads]", 3), ("2[", 3), ("2[]", 3), ("2[rad", 6), ("x + 1e300[TN]", 5),
     ],
 )  # fmt: skip
 def test_a_mistake_is_named_with_its_column(text: str, column: int) -> None:
@@ -130,6 +131,10 @@ UNITS = {
         ("2**phi", "1"),
         ("1 / (m * time)", "1/(kg.s)"),
         ("l**0.5 * sqrt(l)", "m"),
+        ("sin(2[rad/s] * time) * 3[mm]", "m"),
+        ("tanh(omega / 0.5[rpm])", "1"),
+        ("mod(time, 86400)", "s"),
+        ("mod(l, 20[cm])", "m"),
     ],
 )
 def test_units(text: str, unit: str) -> None:
@@ -138,11 +143,32 @@ def test_units(text: str, unit: str) -> None:
 
 @pytest.mark.parametrize(
     ("text", "column"),
-    [("m + l", 3), ("sin(l)", 1), ("l**phi", 2), ("phi**l", 4), ("l < m", 3), ("2 * 3 + l", 7)],
+    [
+        ("m + l", 3),
+        ("sin(l)", 1),
+        ("l**phi", 2),
+        ("phi**l", 4),
+        ("l < m", 3),
+        ("2 * 3 + l", 7),
+        ("3[m] + time", 6),
+        ("mod(time, 2[m])", 1),
+        ("1[kg]", 1),
+    ],
 )
 def test_units_that_do_not_fit(text: str, column: int) -> None:
     with pytest.raises(ExpressionError, match=f"^column {column}: "):
         dimension_of(parse(f"{text}"), UNITS, expected=UNITS["time"])
+
+
+def test_a_number_with_a_unit_is_in_si() -> None:
+    """Their nearest doubles, as the exact factor has them."""
+    for text, value in (
+        ("90[deg]", math.pi / 2), ("3[ mm ]", 0.003), ("20[degC]", 293.15), ("-2[min]", -120.0),
+        ("1.5e3 [rpm] / 1[rad/s]", 50 * math.pi), ("2**3[1]", 8.0), ("mod(7[km], 1.5[km])", 1000.0),
+    ):  # fmt: skip
+        assert parsed(text).value({}) == value
+    assert written(parse("x + 3[mm] * y")) == "x + 0.003[m] * y"
+    assert kind_of(parse("mod(k, 4)"), {"k": WHOLE}) == WHOLE  # as before
 
 
 def test_a_unit_is_a_product_of_symbols() -> None:

@@ -11,7 +11,7 @@ from fractions import Fraction
 from .. import units as si
 from ..units import BASE
 from .expression import EQUALITIES, RELATIONS, ExpressionError, Node, in_order
-from .parser import table_unit
+from .parser import AS_SECOND, table_unit
 
 Dimension = tuple[Fraction, ...]  # exponents, in the order of BASE
 LARGEST_ROOT = 100  # 0.3333333333333333 is 1/3
@@ -67,6 +67,10 @@ def _dimension(
         return _same(node, given)
     if node.op in ("table", "call"):
         return _of_table(node, given, units)
+    if node.op == "unit" and node.name == AS_SECOND:
+        return given[1]
+    if node.op == "unit" and node.name.startswith("["):
+        return of_exponents(si.parsed(node.name[1:-1]).exponents)
     if node.op == "unit":
         return _checked(node, given[0], units.get(node.name, ONE))
     if node.op in (*RELATIONS, *EQUALITIES):

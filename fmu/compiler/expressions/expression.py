@@ -45,7 +45,7 @@ OPERATIONS: dict[str, Callable[..., float]] = {
     "and": lambda a, b: a and b,
     "or": lambda a, b: a or b,
     "not": operator.not_,
-    "unit": lambda a: a,
+    "unit": lambda a, *_: a,
 }
 
 
@@ -76,10 +76,10 @@ class Node:
 
     op is "number" (then `value` counts), "literal" (a condition: whether `value` is 1), "name"
     (then `name`), "text" (`name`, an item of an enumeration), "table" (a look-up in the table
-    `name`), "call" (of the function `name`), "unit" (its argument, in the unit `name`), an operator
-    of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not", "if" (arguments:
-    condition, value if true, otherwise), "floor", "hypot", or a name of `FUNCTIONS`. min and max
-    have two arguments here.
+    `name`), "call" (of the function `name`), "unit" (its first argument, in the unit `name`), an
+    operator of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not", "if"
+    (arguments: condition, value if true, otherwise), "floor", "hypot", or a name of `FUNCTIONS`.
+    min and max have two arguments here.
     "element" of an array by indexes that follow from variables (arguments: the indexes; `name` has
     {} where they come; behind them, once `with_elements` has added them, the elements in `of`).
     Until `at_indexes` has replaced them: other elements, and "sum" of the `body` over the index
@@ -140,6 +140,7 @@ def written(root: Node) -> str:
                 text = node.name
             case "unit":
                 text, own = given[0]
+                text += node.name if node.name.startswith("[") else ""
             case "negative" | "not":
                 text = f"{'-' if node.op == 'negative' else 'not '}{inner[0]}"
             case "if":

@@ -78,6 +78,8 @@ def _kind(node: Node, given: list[Kind], kinds: Mapping[str, Kind]) -> Kind:
     if node.op == "**" and {*given} == {WHOLE}:
         exponent = node.arguments[1]
         is_whole = exponent.op == "number" and exponent.value >= 0
+    if node.op == "unit" and len(given) == 2:
+        return given[0]
     is_whole |= node.op in KEEP_WHOLE and {*given[node.op == "if" :]} == {WHOLE}
     return WHOLE if is_whole or node.op == "floor" else NUMBER
 

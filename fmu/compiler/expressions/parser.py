@@ -2,10 +2,12 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 
+from ..units import BASE, Unit, shown
+from ..units import parsed as unit_of
 from .expression import (
     BINDING,
     CONDITIONAL,
@@ -40,6 +42,7 @@ WORDS = ("and", "or", "not", "if", "else")
 NO_NAMES = (*WORDS, *LITERALS, "True", "False", "None", "lambda")
 DEEPEST = 100  # levels of brackets and other nesting
 UNIT_ONE = "1"  # name of an operation whose value has this unit
+AS_SECOND = "as second"  # name of a "unit", which its second argument has
 SPACE = re.compile(r"\s*")
 TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?!\w|\.(?!\.))"
@@ -112,12 +115,16 @@ class Lookup:
         return Node(self.op, column, (*given, *zeros), name=self.name, function=function)
 
 
-def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -> Node:
+def parse(
+    text: str,
+    functions: Mapping[str, Function | Lookup] | None = None,
+    unit: Callable[[str], Unit] = unit_of,
+) -> Node:
     """Parse an expression; ExpressionError says what is wrong with it.
 
-    functions: further ones, by name.
+    functions: further ones, by name. unit: returns the unit of a text, or raises ValueError.
     """
-    parser = _Parser(_tokens(text), FURTHER if functions is None else {**FURTHER, **functions})
+    parser = _Parser(text, FURTHER if functions is None else {**FURTHER, **functions}, unit)
     root = parser.expression(CONDITIONAL)
     if parser.token.kind != "end":
         raise parser.unexpected("an operator")
@@ -126,7 +133,7 @@ def parse(text: str, functions: Mapping[str, Function | Lookup] | None = None) -
 
 def parse_ranges(text: str) -> list[Range]:
     """Parse "i = 1..n, j = 1..i"; ExpressionError says what is wrong with it."""
-    parser = _Parser(_tokens(text), FURTHER)
+    parser = _Parser(text, FURTHER, unit_of)
     found = [parser.range()]
     while parser.token.text == ",":
         parser.take()
@@ -152,8 +159,14 @@ def _tokens(text: str) -> list[Token]:
 
 
 class _Parser:
-    def __init__(self, tokens: list[Token], functions: Mapping[str, Function | Lookup]) -> None:
-        self._tokens, self._functions = iter(tokens), functions
+    def __init__(
+        self,
+        text: str,
+        functions: Mapping[str, Function | Lookup],
+        unit: Callable[[str], Unit],
+    ) -> None:
+        self._text, self._functions, self._unit = text, functions, unit
+        self._tokens = iter(_tokens(text))
         self.token = next(self._tokens)
         self._depth = 0
         self._operations = 0  # that functions stand for
@@ -262,7 +275,27 @@ class _Parser:
         value = float(token.text)
         if not math.isfinite(value):
             raise ExpressionError(token.column, f"{token.shown} is too large")
+        if self.token.text == "[":
+            return self.quantity(token)
         return Node("number", token.column, value=value)
+
+    def quantity(self, number: Token) -> Node:
+        """Parse the unit of a number, whose value is that in SI."""
+        begin = self.take().column
+        while self.token.text != "]" and self.token.kind != "end":
+            self.take()
+        text = self._text[begin : self.token.column - 1]
+        self.expect("]")
+        try:
+            unit = self._unit(text.strip())
+        except ValueError as error:
+            raise ExpressionError(begin + 1, f"{error}") from None
+        try:
+            value = unit.value(number.text)
+        except ValueError as error:
+            raise ExpressionError(number.column, f"{error}") from None
+        name = f"[{shown({base: unit.exponents.get(base, 0) for base in BASE})}]"
+        return Node("unit", number.column, (Node("number", number.column, value=value),), 0.0, name)
 
     def call(self, function: Token) -> Node:
         """Parse the arguments of a function."""
@@ -305,6 +338,9 @@ class _Parser:
             self._operations += len(in_order([function.body]))
         if self._operations > MOST_OPERATIONS:
             raise ExpressionError(column, TOO_LARGE)
+        if function is FURTHER.get("mod") and arguments[1].op == "number":
+            x, y = arguments
+            arguments = [x, Node("unit", y.column, (y, x), name=AS_SECOND)]
         return function.of(arguments, column)
 
     def derivative(self) -> Node:

@@ -260,7 +260,7 @@ class ModelFile:
                 raise ModelFileError(f"expected an expression in quotes, got {shown(text)}")
             try:
                 if text not in self.parsed:
-                    self.parsed[text] = parse(text, RANDOM_FUNCTIONS | self.functions)
+                    self.parsed[text] = parse(text, RANDOM_FUNCTIONS | self.functions, self.unit)
                 indexes = self.sizes | element.indexes
                 tree = at_indexes(self.parsed[text], indexes, are_known=False)
             except ValueError as error:
