@@ -14,6 +14,7 @@ from rparm.fmu_tools.compiler.expressions.expression import (
     names,
     written,
 )
+from rparm.fmu_tools.compiler.expressions.indexes import at_indexes
 from rparm.fmu_tools.compiler.expressions.kinds import CONDITION, WHOLE, kind_of, with_kinds
 from rparm.fmu_tools.compiler.expressions.parser import parse, parsed
 
@@ -158,6 +159,22 @@ def test_units(text: str, unit: str) -> None:
 def test_units_that_do_not_fit(text: str, column: int) -> None:
     with pytest.raises(ExpressionError, match=f"^column {column}: "):
         dimension_of(parse(f"{text}"), UNITS, expected=UNITS["time"])
+
+
+def test_over_a_range() -> None:
+    """The least, the greatest, any and all of terms; none of them without a term, or with it."""
+    x = {f"x[{i}]": value for i, value in enumerate([3.0, -1.0, 7.0, 2.0], 1)}
+    for text, value in (
+        ("min(i = 1..n, x[i])", -1.0), ("max(i = 1..n - 2, i * x[i])", 3.0),
+        ("max(x[1], x[2])", 3.0), ("min(i = 2..3, max(j = i..n, x[j]))", 7.0),
+        ("1 if any(i = 1..n, x[i] > 6) else 0", 1.0), ("1 if all(i = 1..n, x[i] > 0) else 0", 0.0),
+        ("1 if any(i = 1..0, x[i] > 6) else 0", 0.0), ("1 if all(i = 1..0, x[i] > 0) else 0", 1.0),
+    ):  # fmt: skip
+        assert evaluated(with_kinds(at_indexes(parse(text), {"n": 4})), x) == value, text
+    with pytest.raises(ExpressionError, match="^column 1: min: the range is empty"):
+        at_indexes(parse("min(i = 1..0, x[i])"), {})
+    with pytest.raises(ExpressionError, match="^column 15: expected a condition"):
+        with_kinds(at_indexes(parse("any(i = 1..2, x[i]) or x[1] > 0"), {}))
 
 
 def test_a_number_with_a_unit_is_in_si() -> None:

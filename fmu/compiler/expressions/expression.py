@@ -22,6 +22,8 @@ EQUALITIES = ("==", "!=")  # of what is counted or named
 CONSTANTS = ("pi",)
 MOST_OPERATIONS = 100_000  # that functions and sums make of an expression: they multiply
 TOO_LARGE = f"functions and sums make more than {MOST_OPERATIONS} operations of this expression"
+# functions over a range -> the operations that they are until `at_indexes` has replaced them
+OVER_RANGES = {name: f"{name} over" for name in ("sum", "min", "max", "any", "all")}
 DERIVATIVE = "der"  # of a state, in front of a bracket
 SHOWN = 30  # characters of the text in a message
 # how tightly operators bind
@@ -82,8 +84,8 @@ class Node:
     min and max have two arguments here.
     "element" of an array by indexes that follow from variables (arguments: the indexes; `name` has
     {} where they come; behind them, once `with_elements` has added them, the elements in `of`).
-    Until `at_indexes` has replaced them: other elements, and "sum" of the `body` over the index
-    `name` (arguments: first and last).
+    Until `at_indexes` has replaced them: other elements, and `OVER_RANGES` of the `body` over the
+    index `name` (arguments: first and last).
     `function`: of `FURTHER`, of whose expression it is.
     """
 

@@ -1,4 +1,4 @@
-"""Indexes in expressions: elements of arrays, sums over a range, conditions that indexes decide."""
+"""Indexes in expressions: elements of arrays, sums and the like, conditions on indexes."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -9,6 +9,7 @@ from functools import reduce
 from .expression import (
     MOST_OPERATIONS,
     OPERATIONS,
+    OVER_RANGES,
     TOO_LARGE,
     ExpressionError,
     Node,
@@ -17,6 +18,15 @@ from .expression import (
     in_order,
     names,
 )
+
+# operations over a range -> those of two terms, and their value without any
+TERMS: dict[str, tuple[str, float | bool | None]] = {
+    OVER_RANGES["sum"]: ("+", 0.0),
+    OVER_RANGES["min"]: ("min", None),
+    OVER_RANGES["max"]: ("max", None),
+    OVER_RANGES["any"]: ("or", False),
+    OVER_RANGES["all"]: ("and", True),
+}
 
 
 @dataclass(frozen=True)
@@ -36,7 +46,7 @@ class Range:
 
 
 def at_indexes(root: Node, indexes: Mapping[str, int], are_known: bool = True) -> Node:
-    """Replace indexes by their values, elements by their names, and sums by their terms.
+    """Replace indexes by their values, elements by their names, and `OVER_RANGES` by terms.
 
     Conditions on indexes alone are decided. ExpressionError where an index is none; unless they
     `are_known`, elements stay whose indexes follow from variables.
@@ -101,8 +111,8 @@ class _AtIndexes:
             elif node.op == "element":
                 name = node.name.format(*map(_index, given))
                 new = Node("name", node.column, name=name)
-            elif node.op == "sum":
-                new = self.summed(node, given)
+            elif node.op in TERMS:
+                new = self.of_terms(node, given)
             elif node.op in ("if", "and", "or") and decided.intersection(given):
                 new = _decided(new, decided)
             elif node.op in OPERATIONS and {*given} <= fixed:
@@ -114,8 +124,9 @@ class _AtIndexes:
             found[node] = new
         return found[root]
 
-    def summed(self, node: Node, given: tuple[Node, ...]) -> Node:
-        """Return the terms of a sum, added from the first on."""
+    def of_terms(self, node: Node, given: tuple[Node, ...]) -> Node:
+        """Return the operation on all terms of a range, from the first on."""
+        op, of_none = TERMS[node.op]
         if node.name in self.indexes:
             raise ExpressionError(node.column, f"index {node.name!r} has a meaning already")
         terms = []
@@ -123,9 +134,11 @@ class _AtIndexes:
             self.indexes[node.name] = value
             terms.append(self.of(node.body))
         self.indexes.pop(node.name, None)
+        if not terms and of_none is None:
+            raise ExpressionError(node.column, f"{op}: the range is empty")
         if not terms:
-            return constant(node, 0)
-        return reduce(lambda a, b: Node("+", node.column, (a, b)), terms)
+            return constant(node, of_none)
+        return reduce(lambda a, b: Node(op, node.column, (a, b)), terms)
 
 
 def _decided(node: Node, decided: Collection[Node]) -> Node:

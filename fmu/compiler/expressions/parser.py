@@ -17,6 +17,7 @@ from .expression import (
     MOST_OPERATIONS,
     NOT,
     OR,
+    OVER_RANGES,
     POWER,
     RANDOM,
     RELATION,
@@ -166,15 +167,18 @@ class _Parser:
         unit: Callable[[str], Unit],
     ) -> None:
         self._text, self._functions, self._unit = text, functions, unit
-        self._tokens = iter(_tokens(text))
-        self.token = next(self._tokens)
+        self._tokens, self._at = _tokens(text), 0
         self._depth = 0
         self._operations = 0  # that functions stand for
+
+    @property
+    def token(self) -> Token:
+        return self._tokens[self._at]
 
     def take(self) -> Token:
         """Return the current token, and go to the next one."""
         token = self.token
-        self.token = next(self._tokens, token)
+        self._at = min(self._at + 1, len(self._tokens) - 1)
         return token
 
     def unexpected(self, expected: str) -> ExpressionError:
@@ -259,16 +263,24 @@ class _Parser:
         self.expect("..")
         return Range(token.text, first, self.expression(CONDITIONAL))
 
-    def sum(self, column: int) -> Node:
-        """Parse the range and the terms of a sum."""
+    def has_range(self, function: str) -> bool:
+        """Return whether a call, whose bracket stands here, is one over a range."""
+        if function not in OVER_RANGES or function in self._functions:
+            return False
+        ahead = [token.text for token in self._tokens[self._at + 1 : self._at + 3]]
+        return function not in FUNCTIONS or ahead[-1] == "="
+
+    def over_range(self, function: Token) -> Node:
+        """Parse the range and the terms of a sum, of the least of several, ..."""
+        name, column = function.text, function.column
         self.take()
         over = self.range()
         self.expect(",")
         body = self.expression(CONDITIONAL)
         if self.token.text in ("=", ","):
-            raise self.unexpected("')', as in sum(i = 1..n, sum(j = 1..m, ...))")
+            raise self.unexpected(f"')', as in {name}(i = 1..n, {name}(j = 1..m, ...))")
         self.expect(")")
-        return Node("sum", column, (over.first, over.last), name=over.index, body=body)
+        return Node(OVER_RANGES[name], column, (over.first, over.last), 0.0, over.index, body)
 
     def number(self) -> Node:
         token = self.take()
@@ -301,11 +313,11 @@ class _Parser:
         """Parse the arguments of a function."""
         if function.text == DERIVATIVE:
             return self.derivative()
-        if function.text == "sum":
-            return self.sum(function.column)
+        if self.has_range(function.text):
+            return self.over_range(function)
         further = self._functions.get(function.text)
         if function.text not in FUNCTIONS and further is None:
-            known = [*FUNCTIONS, *self._functions, DERIVATIVE, "sum"]
+            known = [*FUNCTIONS, *self._functions, DERIVATIVE, "sum", "any", "all"]
             text = f"no function {function.shown}{meant(function.text, known)}"
             raise ExpressionError(function.column, f"{text} (known: {', '.join(known)})")
         arguments = []
