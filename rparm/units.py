@@ -129,7 +129,7 @@ def _value(given: str, number: str, name: str, known: Units, is_difference: bool
     if unit is None:
         guess = did_you_mean(name, known)
         raise WrongValueError(f"unknown unit {show(name)}{guess}{_known(known)}")
-    with suppress(OverflowError):
+    with suppress(ValueError):
         if math.isfinite(float(number)):
             return unit.value(number, is_difference)
     raise WrongValueError(f"expected a finite number, got {show(given)}")

@@ -9,6 +9,7 @@ from rparm.fmu_tools.compiler.expressions.dimensions import ONE, dimension_of, o
 from rparm.fmu_tools.compiler.expressions.expression import (
     FUNCTIONS,
     ExpressionError,
+    Node,
     evaluated,
     in_order,
     names,
@@ -97,7 +98,8 @@ def test_a_branch_that_is_not_taken_need_not_have_a_value() -> None:
         ("a @ b", 3), ("a == b", 3), ("a // b", 4), ("'a'", 1), ("a[b]", 3), ("1e999", 1),
         ("1 + True", 5), ("lambda: 1", 7), ("(" * 200, 102), ("-" * 200 + "1", 102), ("a.", 2),
         ("1 + (2 < 3)", 8), ("x if y else z", 6), ("not (1 < 2) + 3", 8), ("1 < 2", 3),
-        ("2[rad]s", 7), ("2[rads]", 3), ("2[", 3), ("2[]", 3), ("2[rad", 6), ("x + 1e300[TN]", 5),
+        ("2[rad]s", 7), ("2[rads]", 3), ("2[", 2), ("2[]", 3), ("2[rad", 2), ("x + 1e300[TN]", 5),
+        ("2[%]", 3), ("1 if 2[m] else 0", 6),
     ],
 )  # fmt: skip
 def test_a_mistake_is_named_with_its_column(text: str, column: int) -> None:
@@ -135,6 +137,7 @@ UNITS = {
         ("sin(2[rad/s] * time) * 3[mm]", "m"),
         ("tanh(omega / 0.5[rpm])", "1"),
         ("mod(time, 86400)", "s"),
+        ("mod(time, -24 * 3600)", "s"),
         ("mod(l, 20[cm])", "m"),
     ],
 )
@@ -161,6 +164,19 @@ def test_units_that_do_not_fit(text: str, column: int) -> None:
         dimension_of(parse(f"{text}"), UNITS, expected=UNITS["time"])
 
 
+def test_indexes_keep_units() -> None:
+    def at(text: str) -> Node:
+        return at_indexes(parse(text), {"n": 3})
+
+    assert shown(dimension_of(at("sum(i = 1..n, i * 2[rad/s] * time) + n"), UNITS)) == "1"
+    for text in ("l + n * 1[kg]", "sum(i = 1..n, i * 2[km]) + phi"):
+        with pytest.raises(ExpressionError, match="do not fit"):
+            dimension_of(at(text), UNITS)
+    for text in ("x[2[m]]", "min(i = 1..3[m], i)"):
+        with pytest.raises(ExpressionError, match="expected a whole number as index"):
+            at(text)
+
+
 def test_over_a_range() -> None:
     """The least, the greatest, any and all of terms; none of them without a term, or with it."""
     x = {f"x[{i}]": value for i, value in enumerate([3.0, -1.0, 7.0, 2.0], 1)}
@@ -181,6 +197,7 @@ def test_a_number_with_a_unit_is_in_si() -> None:
     """Their nearest doubles, as the exact factor has them."""
     for text, value in (
         ("90[deg]", math.pi / 2), ("3[ mm ]", 0.003), ("20[degC]", 293.15), ("-2[min]", -120.0),
+        ("-20[degC]", 253.15), ("- 20[degC] + 0", 253.15), ("-2[m]**2", -4.0),
         ("1.5e3 [rpm] / 1[rad/s]", 50 * math.pi), ("2**3[1]", 8.0), ("mod(7[km], 1.5[km])", 1000.0),
     ):  # fmt: skip
         assert parsed(text).value({}) == value

@@ -68,9 +68,9 @@ def _dimension(
     if node.op in ("table", "call"):
         return _of_table(node, given, units)
     if node.op == "unit" and node.name == AS_SECOND:
-        return given[1]
-    if node.op == "unit" and node.name.startswith("["):
-        return of_exponents(si.parsed(node.name[1:-1]).exponents)
+        return given[1] if given[0] is None else given[0]
+    if node.op == "unit" and node.of:
+        return tuple(map(Fraction, node.of[0]))
     if node.op == "unit":
         return _checked(node, given[0], units.get(node.name, ONE))
     if node.op in (*RELATIONS, *EQUALITIES):

@@ -86,7 +86,8 @@ class Node:
     {} where they come; behind them, once `with_elements` has added them, the elements in `of`).
     Until `at_indexes` has replaced them: other elements, and `OVER_RANGES` of the `body` over the
     index `name` (arguments: first and last).
-    `function`: of `FURTHER`, of whose expression it is.
+    `function`: of `FURTHER`, of whose expression it is. `of` of a "unit" that stands in the text:
+    its exponents, in the order of `BASE`.
     """
 
     op: str

@@ -106,6 +106,8 @@ class _AtIndexes:
                 decided.add(new)
             elif node.op in ("number", "literal"):
                 fixed.add(new)
+            elif node.op == "unit" and node.of:
+                pass  # what it is in would be lost
             elif node.op == "element" and not self.are_known and any(map(names, given)):
                 pass  # of variables
             elif node.op == "element":
@@ -138,7 +140,13 @@ class _AtIndexes:
             raise ExpressionError(node.column, f"{op}: the range is empty")
         if not terms:
             return constant(node, of_none)
-        return reduce(lambda a, b: Node(op, node.column, (a, b)), terms)
+        if op == "+":
+            return reduce(lambda a, b: Node(op, node.column, (a, b)), terms)
+        while len(terms) > 1:  # a tree of few levels
+            pairs = zip(terms[::2], terms[1::2], strict=False)
+            last = terms[-1:] if len(terms) % 2 else []
+            terms = [Node(op, node.column, pair) for pair in pairs] + last
+        return terms[0]
 
 
 def _decided(node: Node, decided: Collection[Node]) -> Node:
@@ -158,7 +166,8 @@ def _index(node: Node) -> int:
         text = f"{min(unknown)!r} is no size and no index of for or sum"
         raise ExpressionError(node.column, text)
     try:
-        value = evaluated(node, {})
+        has_unit = any(each.op == "unit" and each.of for each in in_order([node]))
+        value = math.nan if has_unit else evaluated(node, {})
     except (KeyError, ArithmeticError, ValueError):
         value = math.nan
     if not math.isfinite(value) or value != int(value):

@@ -112,8 +112,12 @@ def _check(node: Node, found: Kind, needed: Kind) -> None:
         return
     if found == TEXT and (node.op == "if" or node.name in needed) and isinstance(needed, tuple):
         return
-    constants = {"number": "the number", "literal": "true" if node.value else "false"}
-    what = shown_text(node.name) if node.op == "text" else node.name
+    constants = {
+        "number": "the number",
+        "unit": "the number",
+        "literal": "true" if node.value else "false",
+    }
+    what = shown_text(node.name) if node.op == "text" else node.name * (node.op != "unit")
     what = what or constants.get(node.op, repr(node.function or node.op))
     wanted, given = (
         kind if isinstance(kind, str) else f"one of {', '.join(map(shown_text, kind))}"

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 
@@ -156,6 +157,12 @@ def _tokens(text: str) -> list[Token]:
         kind = "operator" if found[0] in WORDS else str(found.lastgroup)
         tokens.append(Token(kind, found[0], at + 1))
         at = SPACE.match(text, found.end()).end()
+        if kind == "number" and text[at : at + 1] == "[":  # its unit, of any characters
+            end = text.find("]", at)
+            if end < 0:
+                raise ExpressionError(at + 1, "'[' begins a unit, but there is no ']'")
+            tokens.append(Token("unit", text[at + 1 : end], at + 2))
+            at = SPACE.match(text, end + 1).end()
     return [*tokens, Token("end", "", len(text) + 1)]
 
 
@@ -166,7 +173,7 @@ class _Parser:
         functions: Mapping[str, Function | Lookup],
         unit: Callable[[str], Unit],
     ) -> None:
-        self._text, self._functions, self._unit = text, functions, unit
+        self._functions, self._unit = functions, unit
         self._tokens, self._at = _tokens(text), 0
         self._depth = 0
         self._operations = 0  # that functions stand for
@@ -234,6 +241,9 @@ class _Parser:
             return inner
         if token.text in ("-", "+"):
             self.take()
+            below = self.below_zero() if token.text == "-" else None
+            if below:
+                return below
             value = self.expression(SIGN)
             return value if token.text == "+" else Node("negative", token.column, (value,))
         if token.text == "not" and floor <= NOT:
@@ -287,27 +297,35 @@ class _Parser:
         value = float(token.text)
         if not math.isfinite(value):
             raise ExpressionError(token.column, f"{token.shown} is too large")
-        if self.token.text == "[":
-            return self.quantity(token)
+        if self.token.kind == "unit":
+            return self.quantity(token.text, token.column)
         return Node("number", token.column, value=value)
 
-    def quantity(self, number: Token) -> Node:
+    def quantity(self, number: str, column: int) -> Node:
         """Parse the unit of a number, whose value is that in SI."""
-        begin = self.take().column
-        while self.token.text != "]" and self.token.kind != "end":
-            self.take()
-        text = self._text[begin : self.token.column - 1]
-        self.expect("]")
+        token = self.take()
         try:
-            unit = self._unit(text.strip())
+            unit = self._unit(token.text.strip())
         except ValueError as error:
-            raise ExpressionError(begin + 1, f"{error}") from None
+            raise ExpressionError(token.column, f"{error}") from None
         try:
-            value = unit.value(number.text)
+            value = unit.value(number)
         except ValueError as error:
-            raise ExpressionError(number.column, f"{error}") from None
-        name = f"[{shown({base: unit.exponents.get(base, 0) for base in BASE})}]"
-        return Node("unit", number.column, (Node("number", number.column, value=value),), 0.0, name)
+            raise ExpressionError(column, f"{error}") from None
+        exponents = {base: unit.exponents.get(base, 0) for base in BASE}
+        given = (Node("number", column, value=value),)
+        of = (tuple(exponents.values()),)
+        return Node("unit", column, given, name=f"[{shown(exponents)}]", of=of)
+
+    def below_zero(self) -> Node | None:
+        """Parse a number below the zero of a unit that is not SI's: -20[degC] after its sign."""
+        at, number = self._at, self.take()
+        if number.kind == "number" and self.token.kind == "unit":
+            with suppress(ValueError):
+                if self._unit(self.token.text.strip()).offset:
+                    return self.quantity(f"-{number.text}", number.column)
+        self._at = at
+        return None
 
     def call(self, function: Token) -> Node:
         """Parse the arguments of a function."""
@@ -350,7 +368,7 @@ class _Parser:
             self._operations += len(in_order([function.body]))
         if self._operations > MOST_OPERATIONS:
             raise ExpressionError(column, TOO_LARGE)
-        if function is FURTHER.get("mod") and arguments[1].op == "number":
+        if function is FURTHER.get("mod"):
             x, y = arguments
             arguments = [x, Node("unit", y.column, (y, x), name=AS_SECOND)]
         return function.of(arguments, column)
