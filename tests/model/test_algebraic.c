@@ -150,7 +150,7 @@ static void test_a_solution_is_kept_bit_by_bit(void) {
 }
 
 /* Paths lead downhill from either side of the maximum of the sine, as exactly as residuals tell. */
-static void test_only_a_near_solution_counts(void) {
+static void test_paths_lead_to_the_near_solution(void) {
     double near[] = {0.2};
     TEST_ASSERT_EQUAL(ALGEBRAIC_SOLVED, solved(1, sine, 0.5, true, near).outcome);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, asin(0.5), near[0]);

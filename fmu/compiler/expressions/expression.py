@@ -143,7 +143,7 @@ def written(root: Node) -> str:
                 text = node.name
             case "unit":
                 text, own = given[0]
-                text += node.name if node.name.startswith("[") else ""
+                text += node.name if node.of else ""
             case "negative" | "not":
                 text = f"{'-' if node.op == 'negative' else 'not '}{inner[0]}"
             case "if":
