@@ -23,7 +23,7 @@ from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.runs import scenario
 from rparm.runs.scenario import Scenario
-from rparm.systems.master import start_value
+from rparm.systems.connected_instance import start_value
 from rparm.systems.opened import opened as open_system
 from rparm.systems.opened import system_file
 from rparm.systems.python_component import PythonComponent

@@ -22,7 +22,7 @@ from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.interruption import ENDINGS
-from rparm.systems.master import begin_instance, check_finite
+from rparm.systems.connected_instance import begin_instance, check_finite
 from rparm.systems.structure import Connection, OpenedSystem
 
 Result = TypeVar("Result")

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from rparm.console import PrintedTable
-from rparm.linearization.linear import Linear, scales
+from rparm.linearization.linear import Linear, closure, scales
 from rparm.linearization.sampling import Tick, by_steps, hold, period
 from rparm.linearization.system import SystemSubject, connected, looped
 from rparm.systems import ssp
 from rparm.systems.comparison import Rest
-from rparm.systems.master import INPUT_MODES, ORDERS, Master
+from rparm.systems.master import INPUT_MODES, ORDERS, Master, together
 from rparm.systems.structure import Connection
 from rparm.units import duration, verdict
 
@@ -167,24 +167,84 @@ def transition(
     x, y, dy = np.split(whole, [states, states + outputs])
     dy = dy if sloped else np.zeros_like(y)
     x, y, dy = x.copy(), y.copy(), dy.copy()
-    before = y.copy(), dy.copy()
-    stepped: list[str] = []
-    for name, part in parts.items():
-        rows, own = slices[name]
-        fed = sources[name]
-        ahead = np.array([[c in stepped and order != "jacobi"] for c, _ in fed], float)
-        y_fed, dy_fed = before if order == "jacobi" else (y, dy)
-        places = [place for _, place in fed]
-        slope = dy_fed[places]
-        u = y_fed[places] - step * ahead.reshape(-1, 1) * slope
-        free, forced, ramped = held(name, step)
-        x[rows] = free @ x[rows] + forced @ u + ramped @ slope
-        end = u + step * slope
-        y[own] = part.C @ x[rows] + part.D @ end
-        if sloped:
-            dy[own] = part.C @ (part.A @ x[rows] + part.B @ end) + part.D @ slope
-        stepped.append(name)
+    circles = _circles(parts, connections, slices, sources)
+    stepped: set[str] = set()
+    for group in together(list(parts), circles, order == "jacobi"):
+        y_fed, dy_fed = y.copy(), dy.copy()
+        for name in group:
+            part, (rows, own) = parts[name], slices[name]
+            ahead = np.array([[c in stepped] for c, _ in sources[name]], float)
+            places = [place for _, place in sources[name]]
+            slope = dy_fed[places]
+            u = y_fed[places] - step * ahead.reshape(-1, 1) * slope
+            free, forced, ramped = held(name, step)
+            x[rows] = free @ x[rows] + forced @ u + ramped @ slope
+            end = u + step * slope
+            y[own] = part.C @ x[rows] + part.D @ end
+            if sloped:
+                dy[own] = part.C @ (part.A @ x[rows] + part.B @ end) + part.D @ slope
+        stepped.update(group)
+        for circle in circles:
+            if circle[0].end_component not in group:
+                continue
+            on_loop = _solve(circle, parts, slices, sources, x, y)
+            if sloped:
+                dy[on_loop] = (y[on_loop] - y_fed[on_loop]) / step
     return np.vstack([x, y, dy] if sloped else [x, y])
+
+
+def _circles(
+    parts: Mapping[str, Linear],
+    connections: Sequence[Connection],
+    slices: Mapping[str, tuple[slice, slice]],
+    sources: Mapping[str, Sequence[Source]],
+) -> list[list[Connection]]:
+    """Return the connections of each algebraic loop."""
+    outputs = sum(len(part.outputs) for part in parts.values())
+    direct = np.zeros((outputs, outputs), bool)  # an output follows another
+    for name, part in parts.items():
+        for column, (_, place) in zip(part.D.T, sources[name], strict=True):
+            direct[slices[name][1], place] |= column != 0
+    follows = closure(direct)
+    found: dict[bytes, list[Connection]] = {}
+    for c in connections:
+        part = parts.get(c.end_component)
+        if part is None or c.end_connector not in part.inputs:
+            continue
+        i = part.inputs.index(c.end_connector)
+        place, own = sources[c.end_component][i][1], slices[c.end_component][1]
+        if (follows[place, own] & (part.D[:, i] != 0)).any():
+            loop = (follows[place] & follows[:, place]).tobytes()
+            found.setdefault(loop, []).append(c)
+    return list(found.values())
+
+
+def _solve(
+    circle: Sequence[Connection],
+    parts: Mapping[str, Linear],
+    slices: Mapping[str, tuple[slice, slice]],
+    sources: Mapping[str, Sequence[Source]],
+    x: np.ndarray,
+    y: np.ndarray,
+) -> list[int]:
+    """Solve a loop for the outputs of its components, in y; return places of those that feed it."""
+    ends = [(c.end_component, parts[c.end_component].inputs.index(c.end_connector)) for c in circle]
+    fed = [sources[name][i][1] for name, i in ends]
+    names = {name for name, _ in ends}
+    fixed, by_loop = y.copy(), np.zeros((len(y), len(ends)))
+    for name in names:
+        part, (rows, own) = parts[name], slices[name]
+        others = y[[place for _, place in sources[name]]]
+        for k, (end, i) in enumerate(ends):
+            if end == name:
+                others[i] = 0.0
+                by_loop[own, k] = part.D[:, i]
+        fixed[own] = part.C @ x[rows] + part.D @ others
+    u = np.linalg.solve(np.eye(len(ends)) - by_loop[fed], fixed[fed])
+    for name in names:
+        own = slices[name][1]
+        y[own] = fixed[own] + by_loop[own] @ u
+    return fed
 
 
 def _layout(

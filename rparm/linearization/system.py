@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ from rparm.fmi.model import Value, Variable
 from rparm.linearization import linear
 from rparm.linearization.sampling import Tick, by_steps, hold, samplers
 from rparm.systems import master
-from rparm.systems.master import ConnectedInstance, Master
+from rparm.systems.connected_instance import ConnectedInstance, start_value
+from rparm.systems.master import Master
 from rparm.systems.python_component import PythonComponent, PythonInstance
 from rparm.systems.structure import Connection, OpenedSystem
 
 SAME = 1e-9  # of the largest entry: a model that is another one but for rounding
+SINGULAR = 1e-6  # of 1: what rounding leaves of a matrix times its inverse
 NEGLIGIBLE = 1e-14  # of the largest entries of row and column: rounding
 
 
@@ -101,7 +104,7 @@ class SystemSubject(ExitStack):
     ) -> tuple[linear.Linear, float | None]:
         """Linearize a component by model exchange, before samplers tick; with its time event."""
         name, instance = component.name, component.instance
-        values = {n: master.start_value(instance.fmu, name, n, v) for n, v in given.items()}
+        values = {n: start_value(instance.fmu, name, n, v) for n, v in given.items()}
         component.inputs.get()
         values |= zip(component.inputs.names, component.inputs.view.tolist(), strict=True)
         for c in self.connections:
@@ -228,14 +231,13 @@ def connected(
     """Join the linear models of components whose outputs feed inputs.
 
     Inputs are all components' "component.variable", added to what connections bring. UserError with
-    the path of an algebraic loop.
+    the path of an algebraic loop that has no solution, or many.
     """
     inputs = [f"{name}.{u}" for name, part in parts.items() for u in part.inputs]
     outputs = [f"{name}.{y}" for name, part in parts.items() for y in part.outputs]
     fed = _feeding(inputs, outputs, connections)
     A, B, C, D = map(_diagonal, zip(*map(_clear, parts.values()), strict=True))
-    _refuse_algebraic_loop(outputs, D @ fed)
-    solved, terms = _solved(D @ fed), _solved(np.abs(D) @ fed)
+    solved, terms = _solved(D @ fed, outputs)
     into = fed @ solved
     back, back_terms = B @ into, np.abs(B) @ fed @ terms
     return linear.Linear(
@@ -364,12 +366,23 @@ def _clear(part: linear.Linear) -> tuple[np.ndarray, ...]:
     return whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
 
 
-def _solved(direct: np.ndarray) -> np.ndarray:
-    """Return the inverse of 1 - direct, which has no loops: 1 + direct + direct^2 + ..."""
-    solved = term = np.eye(len(direct))
-    while (term := term @ direct).any():
-        solved = solved + term
-    return solved
+def _solved(direct: np.ndarray, outputs: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the inverse of 1 - direct, and the terms that it sums: 1 + direct + direct^2 + ...
+
+    Loops are solved: their sums do not end. `direct[i, j]`: output i follows output j at once.
+    """
+    one = np.eye(len(direct))
+    solved, terms, power, size = one, one, one, one
+    for _ in range(len(outputs) + 1):
+        power, size = power @ direct, size @ np.abs(direct)
+        if not size.any():
+            return solved, terms
+        solved, terms = solved + power, terms + size
+    with suppress(np.linalg.LinAlgError):
+        solved = np.linalg.solve(one - direct, one)
+        if np.abs(solved @ (one - direct) - one).max(initial=0.0) < SINGULAR:
+            return solved, np.abs(solved)
+    raise UserError(f"the algebraic loop {_circle(outputs, direct)} has no single solution")
 
 
 def _diagonal(blocks: Sequence[np.ndarray]) -> np.ndarray:
@@ -382,25 +395,15 @@ def _diagonal(blocks: Sequence[np.ndarray]) -> np.ndarray:
     return whole
 
 
-def _refuse_algebraic_loop(outputs: Sequence[str], direct: np.ndarray) -> None:
-    """Refuse an algebraic loop; `direct[i, j]`: output i follows output j at once."""
-    following = [np.flatnonzero(row).tolist() for row in direct]
-    path: list[int] = []
-    done: set[int] = set()
-
-    def visit(i: int) -> None:
-        if i in path:
-            circle = [outputs[k] for k in reversed([*path[path.index(i) :], i])]
-            raise UserError(f"the connections form an algebraic loop: {' -> '.join(circle)}")
-        if i in done:
-            return
-        path.append(i)
-        for j in following[i]:
-            visit(j)
-        done.add(path.pop())
-
-    for i in range(len(outputs)):
-        visit(i)
+def _circle(names: Sequence[str], direct: np.ndarray) -> str:
+    """Return the path of an algebraic loop."""
+    rows = zip(names, direct, strict=True)
+    causes = {name: [names[j] for j in np.flatnonzero(row)] for name, row in rows}
+    try:
+        TopologicalSorter(causes).prepare()
+    except CycleError as error:
+        return " -> ".join(error.args[1])
+    return ""
 
 
 # ---- Loops ---------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from rparm.project import VERSIONS
 from rparm.runs import comparison
 from rparm.runs.comparison import Compared, Summed
 from rparm.systems import ecos
-from rparm.systems.master import Master, run_in_master
+from rparm.systems.master import master_of, run_in_master
 from rparm.systems.structure import Component, Connector, OpenedSystem
 
 WHOLE = "whole"  # the name of a system as one component
@@ -87,7 +87,7 @@ def run_alone(
     run = engine(ssp, variant, names, progress)
     errors, why = {}, why_no_estimate(ssp)
     if not why:
-        half = replace(ssp, system=replace(ssp.system, step=ssp.system.step / 2))
+        half = replace(ssp, system=ssp.system.with_step(ssp.system.step / 2))
         real = [name for name in kept(ssp) if ssp.variable(name).type == "Real"]
         columns = [names.index(name) for name in real]
         try:
@@ -289,17 +289,16 @@ def halve(
     if why_not := why_no_estimate(ssp):
         raise UserError(f"{ssp.path}: halves of the step show no error of the coupling: {why_not}")
     system = ssp.system
-    with ssp.unpacked_fmus() as fmus:
-        runs = [
-            _rows_at_whole_steps(fmus, ssp, variant, way, 2**halvings, progress)
-            for halvings in range(HALVINGS + 1)
-        ]
     names = [
         f"{component}.{name}"
         for component, model in ssp.models.items()
         for name in model.real_outputs
     ]
-    values = np.array([rows[:, : len(names)] for rows in runs])
+    with ssp.unpacked_fmus() as fmus:
+        values = np.array([
+            _rows_at_whole_steps(fmus, ssp, variant, way, names, 2**halvings, progress)
+            for halvings in range(HALVINGS + 1)
+        ])  # fmt: skip
     values = values / _sizes(ssp, names, values[-1])
     limit = values[-1] + (values[-1] - values[-2]) / (2 ** order_of(way[1]) - 1)
     errors = np.abs(values - limit)
@@ -307,7 +306,7 @@ def halve(
     with np.errstate(divide="ignore", invalid="ignore"):
         orders = np.log2(differences[:-1] / differences[1:])
     place = int(errors[0].max(axis=0).argmax())
-    steps = system.step / 2.0 ** np.arange(len(runs))
+    steps = system.step / 2.0 ** np.arange(len(values))
     return Halved(*way, steps, errors.max(axis=(1, 2)), orders, names[place])
 
 
@@ -316,19 +315,22 @@ def _rows_at_whole_steps(
     ssp: OpenedSystem,
     variant: str,
     way: tuple[str, str],
+    names: Sequence[str],
     parts: int,
     progress: Callable[[int], object],
 ) -> np.ndarray:
-    """Run with steps in `parts`; return rows (steps + 1, names) at the whole ones."""
+    """Run with steps in `parts`; return rows (steps + 1, names) of outputs at the whole ones."""
     system = ssp.system
-    with Master(fmus, system.connections, *way, signals=system.inputs) as master:
+    parted = replace(ssp, system=system.with_step(system.step / parts))
+    with master_of(parted, fmus, way) as master:
         master.initialize(system.start, system.stop, system.parameter_sets[variant])
-        rows = np.empty((system.steps + 1, len(master.names)))
-        rows[0] = master.values
+        columns = [master.names.index(name) for name in names]
+        rows = np.empty((system.steps + 1, len(names)))
+        rows[0] = master.values[columns]
         for i in range(1, system.steps * parts + 1):
             master.advance(system.start + i * system.step / parts)
             if i % parts == 0:
-                rows[i // parts] = master.values
+                rows[i // parts] = master.values[columns]
             if i % 100 == 0:
                 progress(100)
     return rows

@@ -79,6 +79,8 @@ def absent() -> str:
 
 def unsuited(ssp: "OpenedSystem") -> str:
     """Say why Ecos cannot run a system, or nothing."""
+    from rparm.systems.feedthrough import longest_chain  # the child needs none of it
+
     system = ssp.system
     kinds = {ssp.variable(c.start).type for c in system.connections}
     odd = sorted(kinds & {"Integer", "Enumeration"})
@@ -89,15 +91,19 @@ def unsuited(ssp: "OpenedSystem") -> str:
         return f"{next(iter(system.inputs))} moves"
     if system.start != 0.0:
         return "Ecos starts at 0 s"
+    if system.order != "jacobi":
+        return f"its order is {system.order}"
+    if system.rates:
+        return f"{next(iter(system.rates))} has its own rate"
     if odd:
         return f"there are connections of type {odd[0]}"
     for c, name in settings:
         if ssp.models[c].variables[name].type == "Enumeration":  # left out, with a warning in a log
             return f"component {c!r}: {name!r} is an Enumeration, which Ecos does not set"
     try:
-        chain = ssp.longest_chain
+        chain = longest_chain(system.connections, ssp.models)
     except WrongValueError:
-        return "its FMUs do not exclude an algebraic loop, which Ecos does not find"
+        return "its FMUs do not exclude an algebraic loop, which Ecos does not solve"
     if chain > len(system.components):  # as often Ecos passes values on at the start
         return "values pass a component more than once at the start, which Ecos does not follow"
     if name := ssp.passed_on:

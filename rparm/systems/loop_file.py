@@ -4,7 +4,7 @@ docs/systems.md explains the format. FMUs are copied to a folder, files with equ
 it; then a system is the same as one in an SSP.
 """
 
-import json
+import os
 import re
 import shutil
 from collections.abc import Iterator, Mapping
@@ -14,14 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from rparm import building, project
-from rparm.errors import CodeError, UserError, did_you_mean, hint
+from rparm.errors import CodeError, UserError, did_you_mean
 from rparm.files import (
-    LARGEST_TOML,
     NAME,
-    UnreadableError,
     is_file,
     missing,
-    read_text,
     read_toml,
     show,
 )
@@ -29,10 +26,20 @@ from rparm.fmi.fmu_file import read_model
 from rparm.fmi.model import INPUTS, PARAMETERS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.project import VERSIONS
-from rparm.runs.inputs import Constant, InputReader, Reader, Switches
+from rparm.runs.inputs import Constant, InputReader, Switches
 from rparm.systems.python_component import SUFFIX, PythonComponent, split
+from rparm.systems.sections import (
+    CONNECTIONS,
+    EQUATIONS,
+    KEEP,
+    TIMES,
+    VARIANTS,
+    Given,
+    Sections,
+)
 from rparm.systems.structure import (
     ALONE,
+    WAYS,
     Component,
     Connection,
     Connector,
@@ -46,12 +53,8 @@ from rparm.systems.structure import (
 )
 from rparm.units import SECONDS
 
-COMPONENTS, CONNECTIONS, VARIANTS, KEEP = "components", "connections", "variants", "keep"
-TIMES = ("start", "stop", "step")
-REQUIRED = ("name", COMPONENTS)
-OPTIONAL = ("description", *TIMES, KEEP, CONNECTIONS, INPUTS, PARAMETERS, VARIANTS)
 VARIANT = re.compile(r"\w[\w-]{0,99}", re.ASCII)
-FMU, EQUATIONS, SSP = ".fmu", ".toml", ".ssp"
+FMU, SSP = ".fmu", ".ssp"
 RESOURCES = "resources"  # folder of the FMUs, as in an SSP
 
 
@@ -71,8 +74,8 @@ def opened(
         yield LoopReader(path, folder, version, fmus).system(content, step)
 
 
-class LoopReader(Reader):
-    """Takes the sections of one file; errors name the file and the key."""
+class LoopReader(Sections):
+    """Takes a file with its subsystems; errors name the file and the key."""
 
     def __init__(self, path: Path, folder: Path, version: str, fmus: Path | None) -> None:
         super().__init__(path)
@@ -81,35 +84,31 @@ class LoopReader(Reader):
         self.sources: dict[str, str] = {}  # in the folder
         self.files: dict[str, Path] = {}  # FMUs that the user knows
         self.python: dict[str, Any] = {}
-        self.read: list[Path] = []
-        self.notes: list[str] = []
         self._fmus = FmuReader(path)
         self._copied: dict[Path, str] = {}  # sources, by what they are made of
 
     def system(self, content: dict[str, Any], step: float | None) -> OpenedSystem:
-        self.keys(content, "", REQUIRED, OPTIONAL)
+        given = self.flat(content)
         name = self.name(content["name"], "name")
+        order = content.get("order", "jacobi")
+        if not isinstance(order, str) or order not in WAYS:
+            self.fail(f"order: expected one of {', '.join(WAYS)}, got {show(order)}")
         description = (
             self.text(content["description"], "description") if "description" in content else ""
         )
-        components = self.table(content[COMPONENTS], f"[{COMPONENTS}]")
-        if not components:
-            self.fail(f"[{COMPONENTS}]: expected a component")
-        self.moved = self.entries(content, INPUTS)
+        components, self.moved = given.components, given.inputs
         self.connections = connections = [
-            self.connection(end, start, components)
-            for end, start in self.entries(content, CONNECTIONS).items()
+            self.connection(end, start, components) for end, start in given.connections.items()
         ]
-        for component, given in components.items():
-            where = f"[{COMPONENTS}] {component}"
-            self.name(component, f"[{COMPONENTS}]")
-            self.component(component, self.text(given, where), where)
+        for component, made_of in components.items():
+            self.component(component, made_of)
         start, stop, step = self.times(content, step)
-        parameters, descriptions = self.parameters(content)
+        parameters, descriptions = self.parameters(content, given.parameters)
         system = System(
             name=name, components=tuple(self.connected(component) for component in components),
             connections=tuple(connections), start=start, stop=stop, step=step,
-            parameters=parameters, descriptions=descriptions, description=description,
+            parameters=parameters, descriptions=descriptions, description=description, order=order,
+            rates={c: x.every for c, x in components.items() if x.every is not None},
         )  # fmt: skip
         check(self.path, system, self.models)
         system = self.with_inputs(system, self.moved)
@@ -126,43 +125,6 @@ class LoopReader(Reader):
 
     # ---- Names -----------------------------------------------------------------------------------
 
-    def name(self, given: Any, key: str) -> str:
-        if not isinstance(given, str) or not NAME.fullmatch(given):
-            self.fail(
-                f"{key}: expected a name, a letter, then letters, digits, _, got {show(given)}"
-            )
-        return given
-
-    def entries(self, content: Mapping[str, Any], section: str) -> dict[str, Any]:
-        """Return a section by component.variable, which may also be written as tables."""
-        found: dict[str, Any] = {}
-
-        def add(table: Mapping[str, Any], begin: str) -> None:
-            for key, value in table.items():
-                name = f"{begin}{key}"
-                # an input is a table itself, whose values are none
-                nests = isinstance(value, dict) and (
-                    section != INPUTS or any(isinstance(x, dict) for x in value.values())
-                )
-                if nests:
-                    add(value, f"{name}.")
-                elif name in found:
-                    self.fail(f"[{section}] {name}: is there twice")
-                else:
-                    found[name] = value
-
-        add(self.table(content.get(section, {}), f"[{section}]"), "")
-        return found
-
-    def parts(self, given: Any, where: str, components: Mapping[str, Any]) -> tuple[str, str]:
-        """Return component and variable of a name "component.variable"."""
-        component, dot, variable = given.partition(".") if isinstance(given, str) else ("", "", "")
-        if not (component and dot and variable):
-            self.fail(f"{where}: expected COMPONENT.VARIABLE, got {show(given)}")
-        if component not in components:
-            self.fail(f"{where}: no component {component!r}{hint(component, components)}")
-        return component, variable
-
     def variable(self, given: Any, where: str) -> tuple[str, Variable]:
         """Return component and variable of a name."""
         component, name = self.parts(given, where, self.models)
@@ -174,54 +136,55 @@ class LoopReader(Reader):
 
     # ---- Components ------------------------------------------------------------------------------
 
-    def component(self, name: str, given: str, where: str) -> None:
+    def component(self, name: str, given: Given) -> None:
         """Find what a component is made of, and what it declares."""
-        file, _ = split(given)
-        path, suffix = self.path.parent / file, Path(file).suffix.lower()
+        file, _ = split(given.source)
+        path, suffix = given.folder / file, Path(file).suffix.lower()
         if suffix in (FMU, EQUATIONS, SUFFIX, SSP) and not is_file(path):
-            self.fail(f"{where}: {file}: {missing(path)}")
+            self.fail(f"{given.where}: {file}: {missing(path)}")
         try:
             if suffix == SUFFIX:
                 self.code(name, given)
                 return
-            if suffix == SSP or (suffix == EQUATIONS and project.is_system(read_toml(path))):
-                way_out = "write its components and connections into this file"
+            if suffix == SSP:
+                way_out = "write its components and connections into a loop file"
                 raise UserError(f"{file} is a system, expected one component: {way_out}")
             if suffix == EQUATIONS:
                 made = path
                 fmu = self.built(path)
             elif suffix == FMU:
                 made = fmu = path
-            elif not NAME.fullmatch(given):
+            elif not NAME.fullmatch(given.source):
                 expected = "a file .fmu, .toml with equations or .py, or a name of the project"
-                raise UserError(f"expected {expected}, got {show(given)}")
+                raise UserError(f"expected {expected}, got {show(given.source)}")
             elif self.fmus:
-                made = fmu = self.fmus / f"{given}{FMU}"
+                made = fmu = self.fmus / f"{given.source}{FMU}"
             else:
-                made = fmu = project.built(project.model(given), FMU, version=self.version)
+                found = project.model(given.source)
+                made = fmu = project.built(found, FMU, version=self.version)
             if not self.fmus:
                 read_model(fmu)  # runs on this platform
         except CodeError:
             raise  # has its place
         except UserError as error:
-            self.fail(f"{where}: {error}")
+            self.fail(f"{given.where}: {error}")
         self.files[name] = made
         self.models[name] = self._fmus.read(name, fmu, made)
         self.sources[name] = self.copied(name, fmu)
 
-    def code(self, name: str, given: str) -> None:
+    def code(self, name: str, given: Given) -> None:
         """Read a component in Python; a function has the inputs and outputs that are connected."""
-        outside = [
-            self.parts(x, INPUTS, {name: ""})[1] for x in self.moved if x.startswith(f"{name}.")
-        ]
+        known = {name: ""}
+        outside = [self.parts(x, INPUTS, known)[1] for x in self.moved if x.startswith(f"{name}.")]
         inputs = [c.end_connector for c in self.connections if c.end_component == name] + outside
         outputs = [c.start_connector for c in self.connections if c.start_component == name]
         made = PythonComponent.read(
-            given, self.path.parent, list(dict.fromkeys(inputs)), list(dict.fromkeys(outputs))
+            given.source, given.folder, list(dict.fromkeys(inputs)), list(dict.fromkeys(outputs))
         )
         self.python[name] = lambda: made
-        self.read += self.path.parent.glob(f"*{SUFFIX}")  # it may import others
-        self.models[name], self.sources[name] = made.model, given
+        self.read += given.folder.glob(f"*{SUFFIX}")  # it may import others
+        self.models[name] = made.model
+        self.sources[name] = os.path.relpath(given.folder / given.source, self.path.parent)
 
     def built(self, path: Path) -> Path:
         """Build an FMU of a file with equations, once."""
@@ -277,32 +240,27 @@ class LoopReader(Reader):
     # ---- Parameters ------------------------------------------------------------------------------
 
     def parameters(
-        self, content: Mapping[str, Any]
+        self, content: Mapping[str, Any], given: Mapping[str, Any]
     ) -> tuple[dict[str, dict[str, dict[str, Parameter]]], dict[str, str]]:
         """Return values by variant, component and variable, and descriptions of variants."""
-        own = self.values(content, PARAMETERS, f"[{PARAMETERS}]")
+        own = self.values(given, f"[{PARAMETERS}]")
         found, descriptions = {ALONE: own}, {}
-        for name, given in self.table(content.get(VARIANTS, {}), f"[{VARIANTS}]").items():
+        for name, changes in self.table(content.get(VARIANTS, {}), f"[{VARIANTS}]").items():
             where = f"[{VARIANTS}.{name}]"
             if not VARIANT.fullmatch(name):
                 self.fail(f"{where}: expected a name of letters, digits, _ and -")
             if name == ALONE:
                 self.fail(f"{where}: {ALONE!r} stands for [{PARAMETERS}]; choose another name")
-            table = dict(self.table(given, where))
+            table = dict(self.table(changes, where))
             if "description" in table:
                 descriptions[name] = self.text(table.pop("description"), f"{where} description")
-            changed = self.values({PARAMETERS: table}, PARAMETERS, where)
+            changed = self.values(self.given_values({PARAMETERS: table}, PARAMETERS, where), where)
             every = dict.fromkeys([*own, *changed])
             found[name] = {c: own.get(c, {}) | changed.get(c, {}) for c in every}
         return found, descriptions
 
-    def values(
-        self, content: Mapping[str, Any], section: str, where: str
-    ) -> dict[str, dict[str, Parameter]]:
-        """Return the values of a section by component and variable."""
-        given = self.entries(content, section)
-        if "file" in given:
-            given = self.numbers(given.pop("file"), f"{where} file") | given
+    def values(self, given: Mapping[str, Any], where: str) -> dict[str, dict[str, Parameter]]:
+        """Return values by component and variable."""
         found: dict[str, dict[str, Parameter]] = {}
         for name, value in given.items():
             component, variable = self.variable(name, where)
@@ -316,16 +274,6 @@ class LoopReader(Reader):
         if question := variable.question(given):
             self.notes.append(f"{where}: {question}")
         return parameter
-
-    def numbers(self, given: Any, where: str) -> dict[str, Any]:
-        """Read a JSON file of values by component.variable, or by component and variable."""
-        path = self.path.parent / self.text(given, where)
-        self.read.append(path)
-        try:
-            content = json.loads(read_text(path, LARGEST_TOML))
-        except (UnreadableError, ValueError, RecursionError) as error:
-            self.fail(f"{where}: {path}: {error}")
-        return self.entries({PARAMETERS: content}, PARAMETERS)
 
     # ---- Inputs ----------------------------------------------------------------------------------
 
@@ -352,7 +300,7 @@ class LoopReader(Reader):
         self.notes += reader.warnings
         moving, variants = {}, system.parameters
         for name, signal in signals.items():
-            component, _, variable = name.partition(".")
+            component, variable = self.parts(name, INPUTS, self.models)
             if isinstance(signal, Constant):
                 held = Parameter("Real", signal.value, known[name].unit)
             elif isinstance(signal, Switches) and len(signal.points) == 1:

@@ -10,122 +10,42 @@ components before it, those of its beginning from itself and the components behi
 Inputs keep their values over a step, a zero-order hold ("held"), or are straight lines through the
 value of their source at the time at which it was read, with its slope there: in Jacobi order they
 extrapolate from the beginning of the step, in Gauss-Seidel order those from components before it
-meet value and slope at the end of the step. In FMI 3.0 inputs get slopes only within a step: at
-the start, the slopes of outputs lack the part due to the slopes of inputs.
+meet value and slope at the end of the step. Where an FMU gives no slopes of outputs, or they are on
+an algebraic loop, the line goes through the last two values, and is level at the start and after a
+switch. In FMI 3.0 inputs get slopes only within a step: at the start, the slopes of outputs lack
+the part due to the slopes of inputs.
+
+Components may have rates of their own: each makes its step when the system comes to the end of it,
+with inputs of the time at which it began. The inputs on algebraic loops are solved for whenever
+components on them are at a communication point; in Gauss-Seidel order these step together.
 
 A Boolean, Integer or Enumeration that has changed in a step is passed on at the end of the step, in
 both orders. Then all outputs are computed again at this time, as at the start.
 """
 
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from ctypes import Array, c_double, sizeof
+from ctypes import c_double
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from rparm.errors import UserError, placed
-from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
+from rparm.errors import UserError
+from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INPUTS, Model, Value
+from rparm.fmi.model import Model, Value
 from rparm.runs.inputs import Signal
+from rparm.systems.algebraic_loop import AlgebraicLoop
+from rparm.systems.connected_instance import ConnectedInstance, check_finite
 from rparm.systems.ecos import Run, said_at_end
+from rparm.systems.feedthrough import loops, sequence
 from rparm.systems.python_component import is_python
-from rparm.systems.structure import Connection, OpenedSystem, split
+from rparm.systems.structure import WAYS, Connection, OpenedSystem, split
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
 DISCRETE = ("Boolean", "Integer", "Enumeration")  # types of what switches
-
-
-# ---- Components ----------------------------------------------------------------------------------
-class ConnectedInstance:
-    """An instance, its place among the system's values, and the sources of its inputs.
-
-    From index `first` on, `values` and `slopes`, their derivatives with respect to time, are those
-    of its outputs; `feeding` names the outputs that are connected. Each input has a source, an
-    index of `values`, whose component steps `ahead` of this one or not.
-    """
-
-    def __init__(
-        self,
-        instance: Instance,
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        first: int,
-        feeding: Collection[str],
-        sources: Sequence[int],
-        ahead: Sequence[bool],
-        values: Array,
-        slopes: np.ndarray,
-    ) -> None:
-        self.instance = instance
-        self.sources = np.array(sources, dtype=int)
-        self.ahead = np.array(ahead, dtype=bool)
-        memory = (c_double * len(outputs)).from_buffer(values, first * sizeof(c_double))
-        self.outputs = instance.reals(outputs, memory)
-        self.inputs = instance.reals(inputs)
-        self._lines = instance.input_polynomials(inputs, 1)
-        connected = [i for i, name in enumerate(outputs) if name in feeding]
-        self._output_slopes = instance.output_derivatives([outputs[i] for i in connected], 1)
-        self._slopes = slopes
-        self._slope_indices = first + np.array(connected, dtype=int)
-
-    @property
-    def name(self) -> str:
-        return self.instance.name
-
-    def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
-        for name in self.inputs.names:
-            if name in parameters:
-                raise UserError(f"{self.name}.{name}: is connected and cannot be set")
-        begin_instance(self.instance, start, stop, parameters)
-
-    def set_inputs(self, values: np.ndarray) -> None:
-        """Set the inputs, (inputs,), in their units."""
-        self.inputs.view[:] = values
-        self.inputs.set()
-
-    def set_lines(self, values: np.ndarray, slopes: np.ndarray) -> None:
-        """Set the inputs and their derivatives with respect to time, (inputs,) each."""
-        self._lines.view[:] = values, slopes
-        self._lines.set()
-
-    def read(self) -> None:
-        self.outputs.get()
-
-    def read_slopes(self) -> None:
-        self._output_slopes.get()
-        self._slopes[self._slope_indices] = self._output_slopes.view
-
-
-def begin_instance(
-    instance: Instance, start: float, stop: float | None, parameters: Mapping[str, Value]
-) -> None:
-    instance.set_up(start, stop)
-    for name, value in parameters.items():
-        instance.set(name, start_value(instance.fmu, instance.name, name, value))
-    instance.enter_initialization()
-
-
-def check_finite(component: str, outputs: Reals, when: str) -> None:
-    bad = np.flatnonzero(~np.isfinite(outputs.view))
-    if len(bad):
-        name, value = f"{component}.{outputs.names[bad[0]]}", outputs.view[bad[0]]
-        raise UserError(f"{name} is {value} {when}: a finite value is expected")
-
-
-def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
-    """Return the value to set before initialization, an item as its number; else UserError."""
-    variable = fmu.model.variables.get(name)
-    if variable is None or not (variable.can_start or variable.is_a(INPUTS)):
-        raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
-    is_item = variable.type == "Enumeration" and isinstance(value, str)
-    if not is_item and variable.type != "Boolean":
-        return value
-    with placed(f"{component}.{name}"):
-        return variable.checked(value)
 
 
 # ---- The master ----------------------------------------------------------------------------------
@@ -151,7 +71,8 @@ class SystemSnapshot(AbstractContextManager["SystemSnapshot"]):
         for component, state in zip(master.components.values(), self._states, strict=True):
             with component.instance.explained(self._when()):
                 state.take()
-        self._kept = master.time, master.values.copy(), master.slopes.copy()
+        places = [(c.time, c.ticks, c.kept.copy()) for c in master.components.values()]
+        self._kept = master.time, master.values.copy(), master.slopes.copy(), places
 
     def restore(self) -> None:
         """Bring the system back to the state kept, as often as wanted."""
@@ -159,7 +80,9 @@ class SystemSnapshot(AbstractContextManager["SystemSnapshot"]):
         for component, state in zip(master.components.values(), self._states, strict=True):
             with component.instance.explained(self._when()):
                 state.restore()
-        master.time, master.values[:], master.slopes[:] = self._kept
+        master.time, master.values[:], master.slopes[:], places = self._kept
+        for component, place in zip(master.components.values(), places, strict=True):
+            component.time, component.ticks, component.kept[:] = place
 
     def _when(self) -> str:
         return f"at the communication point t = {self._master.time!r} s"
@@ -170,8 +93,8 @@ class Master(AbstractContextManager["Master"]):
 
     In Gauss-Seidel order components step in the order of `fmus`. After each step all Real outputs
     are read, and Real variables `also` (component, variable). Inputs of `signals`, by
-    "component.variable", take over each step the signal's value at its beginning. UserError if
-    names are unknown, an input has several sources, or an FMU cannot do what is asked.
+    "component.variable", take over each step the signal's value at its beginning. Components of
+    `rates` step every so many s. UserError if names are unknown or an input has several sources.
 
     Attributes
     ----------
@@ -196,6 +119,7 @@ class Master(AbstractContextManager["Master"]):
         inputs: str = "held",
         also: Sequence[tuple[str, str]] = (),
         signals: Mapping[str, Signal] | None = None,
+        rates: Mapping[str, float] | None = None,
     ) -> None:
         if order not in ORDERS or inputs not in INPUT_MODES:
             raise UserError(f"expected an order of {ORDERS} and inputs of {INPUT_MODES}")
@@ -203,7 +127,7 @@ class Master(AbstractContextManager["Master"]):
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
         connections, signals = list(connections), signals or {}
-        self._switches, real = _split(fmus, connections, self.extrapolates)
+        self._switches, real = _split(fmus, connections)
         self._links = len(connections) + len(signals)  # values pass each once
         for name in signals:
             if name in {c.end for c in connections}:
@@ -220,12 +144,13 @@ class Master(AbstractContextManager["Master"]):
             instances = {}
             for name, fmu in fmus.items():
                 fed = [c.end_connector for c in real if c.end_component == name]
-                instance = fmu.instance(name, fed if self.extrapolates else ())
+                is_smooth = self.extrapolates and fmu.model.interpolates_inputs
+                instance = fmu.instance(name, fed if is_smooth else ())
                 instances[name] = self._stack.enter_context(instance)
         except BaseException:
             self._stack.close()
             raise
-        self._connect(instances, real, also)
+        self._connect(instances, real, also, loops(real, models), rates or {})
 
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)
@@ -235,8 +160,12 @@ class Master(AbstractContextManager["Master"]):
         instances: Mapping[str, Instance],
         connections: Sequence[Connection],
         also: Sequence[tuple[str, str]],
+        circles: Sequence[Sequence[Connection]],
+        rates: Mapping[str, float],
     ) -> None:
         """Lay out the system's values, and find the source of each input among them."""
+        groups = together(list(instances), circles, self.jacobi)
+        rank = {name: i for i, group in enumerate(groups) for name in group}
         # variables to read, by component
         outputs = {}
         for name, instance in instances.items():
@@ -268,12 +197,26 @@ class Master(AbstractContextManager["Master"]):
                 outputs=outputs[name],
                 first=first,
                 feeding=feeding,
+                solved={c.start_connector for circle in circles for c in circle
+                        if c.start_component == name},
                 sources=[index[source] for source in sources],
-                ahead=[x in self.components and not self.jacobi for x, _ in sources],
+                ahead=[rank[x] < rank[name] for x, _ in sources],
                 values=memory,
                 slopes=self.slopes,
-            )
+                every=rates.get(name),
+            )  # fmt: skip
             first += len(outputs[name])
+        self._groups = [[self.components[name] for name in group] for group in groups]
+        self._loops = [self._loop(circle) for circle in circles]
+        self.due = list(self.components.values())  # that the last step has brought to its end
+
+    def _loop(self, circle: Sequence[Connection]) -> AlgebraicLoop:
+        ends = [self.components[c.end_component] for c in circle]
+        places = [
+            component.inputs.names.index(c.end_connector)
+            for component, c in zip(ends, circle, strict=True)
+        ]
+        return AlgebraicLoop(list(zip(ends, places, strict=True)), [str(c) for c in circle])
 
     # ---- Initialization --------------------------------------------------------------------------
 
@@ -290,8 +233,9 @@ class Master(AbstractContextManager["Master"]):
                 known = ", ".join(self.components)
                 raise UserError(f"{name}: no such component (there are: {known})")
         self.time = self._start = start
+        self.due = list(self.components.values())
         self._drive()
-        for component in self.components.values():
+        for component in self.due:
             component.begin(start, stop, parameters.get(component.name, {}))
         self._propagate(self._read_early, "in initialization")
         for component in self.components.values():
@@ -309,17 +253,24 @@ class Master(AbstractContextManager["Master"]):
         before = np.full(len(self.names), np.nan)
         for _ in range(self._links + 2):
             switched = self._transfer_switches()
-            for component in self.components.values():
+            for component in self.due:
                 read(component)
+            self._solve(self.due, when)
             changing = np.flatnonzero(before != self.values)
             if not (len(changing) or switched):
                 return
             before = self.values.copy()
-            for component in self.components.values():
-                with component.instance.explained(when):
-                    component.set_inputs(self.values[component.sources])
+            for component in self.due:
+                if not component.is_on_loop:
+                    with component.instance.explained(when):
+                        component.set_inputs(self.values[component.sources])
         names = ", ".join([*(self.names[i] for i in changing), *switched])
         raise UserError(f"the connections form an algebraic loop: {names}")
+
+    def _solve(self, components: Sequence[ConnectedInstance], when: str) -> None:
+        """Solve the algebraic loops of components at this time."""
+        for loop in self._loops:
+            loop.solve(self.values, components, when)
 
     def _follow(self) -> None:
         """Compute all outputs at this time from inputs that follow them at once."""
@@ -327,6 +278,8 @@ class Master(AbstractContextManager["Master"]):
         self._propagate(lambda component: self._read(component, self.time), when)
         if self.extrapolates:
             self._propagate_slopes()
+            for component in self.due:
+                component.level_slopes()
 
     def _transfer_switches(self) -> list[str]:
         """Set the discrete inputs whose sources have another value, and return their names."""
@@ -338,7 +291,8 @@ class Master(AbstractContextManager["Master"]):
         changed = []
         for (component, variable), value in wanted.items():
             target = self.components[component].instance
-            if value != target.discrete(variable):
+            is_here = self.components[component] in self.due
+            if is_here and value != target.discrete(variable):
                 target.set(variable, value)
                 changed.append(f"{component}.{variable}")
         return changed
@@ -351,49 +305,68 @@ class Master(AbstractContextManager["Master"]):
     def _propagate_slopes(self) -> None:
         """Read slopes at one time: once per component, since inputs' slopes show in outputs'."""
         when = f"for slopes at t = {self.time!r} s"
-        for _ in self.components:
-            for component in self.components.values():
+        for _ in self.due:
+            for component in self.due:
                 with component.instance.explained(when):
                     component.read_slopes()
-            for component in self.components.values():
+            for component in self.due:
                 with component.instance.explained(when):
-                    known = component.sources
-                    component.set_lines(self.values[known], self.slopes[known])
-        for component in self.components.values():
+                    component.keep(self.values, self.slopes)
+                    component.set_lines(0.0)
+        for component in self.due:
             with component.instance.explained(when):
                 component.read_slopes()
 
     # ---- Steps -----------------------------------------------------------------------------------
 
     def advance(self, end: float) -> None:
-        """Make one step to the time `end`, s."""
+        """Make one step to the time `end`, s; components of other rates do when theirs ends."""
         length = end - self.time
-        components = list(self.components.values())
-        groups = [components] if self.jacobi else [[component] for component in components]
-        for group in groups:
-            for component in group:
-                try:
-                    self._set_inputs(component, length)
-                    component.instance.do_step(self.time, length, goes_back=True)
-                except FMICallException as error:
-                    when = f"in the step from t = {self.time!r} s"
-                    raise component.instance.failure(error, when) from error
-                self.do_steps += 1
-            for component in group:
+        for component in self.components.values():
+            if component.time == self.time:
+                component.keep(self._at(self.time), self.slopes)
+        self.due = [c for c in self.components.values() if c.is_due(end, length)]
+        for group in self._groups:
+            stepping = [component for component in group if component in self.due]
+            before = [(component.outputs.view.copy(), component.time) for component in stepping]
+            for component in stepping:
+                component.renew(self._at(component.time), self.slopes)
+                self._step(component, end)
+            for component in stepping:
                 self._read(component, end)
+                component.ended(end, length)
+            self._solve(stepping, f"at t = {end!r} s")
+            if self.extrapolates:
+                for component, (values, begin) in zip(stepping, before, strict=True):
+                    component.draw_slopes(values, end - begin)
         self.time = end
         self._drive()
         if self._transfer_switches():
             self._follow()
 
-    def _set_inputs(self, component: ConnectedInstance, length: float) -> None:
-        """Set inputs at the beginning of the step, of sources ahead and of others."""
-        values = self.values[component.sources]
-        if self.extrapolates:
-            slopes = self.slopes[component.sources]
-            component.set_lines(values - length * component.ahead * slopes, slopes)
-        else:
-            component.set_inputs(values)
+    def _at(self, time: float) -> np.ndarray:
+        """Return all values at a time, by lines if inputs are extrapolated."""
+        if not self.extrapolates:
+            return self.values
+        found = self.values.copy()
+        for c in self.components.values():
+            found[c.first : c.end] += self.slopes[c.first : c.end] * (time - c.time)
+        return found
+
+    def _step(self, component: ConnectedInstance, end: float) -> None:
+        begin, length = component.time, end - component.time
+        try:
+            if self.extrapolates:
+                component.set_lines(length)
+            else:
+                component.set_inputs(component.kept[0])
+            component.instance.do_step(begin, length, goes_back=True)
+            if self.extrapolates:
+                component.end_lines(length)
+        except FMICallException as error:
+            when = f"in the step from t = {begin!r} s"
+            raise component.instance.failure(error, when) from error
+        self.do_steps += 1
 
     def _read(self, component: ConnectedInstance, end: float) -> None:
         try:
@@ -436,8 +409,21 @@ def _driven(fmus: Mapping[str, Fmu], component: str, variable: str) -> str:
     return str(kind)
 
 
+def together(
+    names: Sequence[str], circles: Iterable[Iterable[Connection]], is_jacobi: bool
+) -> list[list[str]]:
+    """Return the components that step together, in order."""
+    if is_jacobi:
+        return [list(names)]
+    found = {name: [name] for name in names}
+    for circle in circles:
+        whole = {x for c in circle for x in found[c.end_component]}
+        found |= dict.fromkeys(whole, [name for name in names if name in whole])
+    return [group for name, group in found.items() if name == group[0]]
+
+
 def _split(
-    fmus: Mapping[str, Fmu], connections: Iterable[Connection], sloped: bool
+    fmus: Mapping[str, Fmu], connections: Iterable[Connection]
 ) -> tuple[list[Connection], list[Connection]]:
     """Split connections into discrete ones and Reals; no input has two."""
     switches: list[Connection] = []
@@ -457,12 +443,6 @@ def _split(
         if end in seen:
             raise UserError(f"{'.'.join(end)}: is connected more than once")
         seen.add(end)
-    for c in reals if sloped else ():
-        source, target = fmus[c.start_component], fmus[c.end_component]
-        if not source.model.gives_output_derivatives:
-            raise UserError(f"{c.start_component}: {source.path} has no output derivatives")
-        if not target.model.interpolates_inputs:
-            raise UserError(f"{c.end_component}: {target.path} does not interpolate inputs")
     return switches, reals
 
 
@@ -482,34 +462,53 @@ def ways(models: Mapping[str, Model], connections: Iterable[Connection]) -> list
     return [(order, inputs) for inputs in INPUT_MODES[: 1 + can] for order in ORDERS]
 
 
-# ---- A variant -----------------------------------------------------------------------------------
+# ---- Of a file -----------------------------------------------------------------------------------
+def master_of(
+    ssp: OpenedSystem, fmus: Mapping[str, Fmu], way: tuple[str, str] | None = None
+) -> Master:
+    """Return the master of a system, as its file orders or in a `way`: its order and inputs."""
+    system = ssp.system
+    order, inputs = way or WAYS[system.order]
+    names = list(fmus)
+    if order != "jacobi":
+        names = sequence(names, system.connections, ssp.models)
+    return Master(
+        {name: fmus[name] for name in names}, system.connections, order, inputs,
+        signals=system.inputs, rates=system.rates,
+    )  # fmt: skip
+
+
 def run_in_master(
     ssp: OpenedSystem,
     variant: str,
     names: Sequence[str],
     progress: Callable[[int], object] = lambda _: None,
 ) -> Run:
-    """Run a variant in Jacobi order; read ``component.variable`` as Ecos would, all finite.
+    """Run a variant; read ``component.variable`` as Ecos would, all finite.
 
-    `progress` is called with the steps just done.
+    In Jacobi order rows are read after the inputs of the next step have been set, in others at the
+    end of each step. `progress` is called with the steps just done.
     """
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))
-    with (
-        ssp.unpacked_fmus() as fmus,
-        Master(fmus, system.connections, signals=system.inputs) as master,
-    ):
+    with ssp.unpacked_fmus() as fmus, master_of(ssp, fmus) as master:
         master.initialize(system.start, float(times[-1]), system.parameter_sets[variant])
         readers = [_RowReader(ssp, c, names) for c in master.components.values()]
+        sets = WAYS[system.order] == WAYS["jacobi"]
         begin = time.perf_counter()
         for row, end in enumerate(times.tolist()):
             try:
                 if row:
                     master.advance(end)
+                    rows[row] = rows[row - 1]
                 for reader in readers:
-                    with reader.component.instance.explained(f"at t = {end!r} s"):
-                        reader.component.set_inputs(master.values[reader.component.sources])
+                    component = reader.component
+                    if component not in master.due:
+                        continue
+                    with component.instance.explained(f"at t = {end!r} s"):
+                        if sets:
+                            component.set_inputs(master.values[component.sources])
                         reader.read(rows[row])
             except UserError as error:
                 if row > 1:
@@ -520,10 +519,10 @@ def run_in_master(
         wall_time = time.perf_counter() - begin
         known = master.components.values()
         messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]
-        said, row = {}, np.empty(1)
+        said, last = {}, np.empty(1)
         for name in said_at_end(ssp):
-            _RowReader(ssp, master.components[ssp.split(name)[0]], [name]).read(row)
-            said[name] = float(row[0])
+            _RowReader(ssp, master.components[ssp.split(name)[0]], [name]).read(last)
+            said[name] = float(last[0])
     return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
 
 

@@ -133,6 +133,8 @@ class PythonComponent(AbstractContextManager["PythonComponent"]):
             gives_output_derivatives=False,
             saves_states=made.saves,
             gives_directional_derivatives=False,
+            # a step gives outputs, from inputs at its beginning
+            dependencies={v.name: () for v in variables if v.causality == "output"},
         )
 
     @property

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
-from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -22,6 +21,12 @@ from rparm.units import number
 
 ALONE = "default"  # the variant of a system that has no parameter sets
 STEPS = 1000  # of a run whose step nothing says
+# order of a file's steps -> order and inputs of the master
+WAYS = {
+    "jacobi": ("jacobi", "held"),
+    "gauss_seidel": ("gauss_seidel", "held"),
+    "extrapolated": ("jacobi", "extrapolated"),
+}
 # type of a variable -> types of a parameter's value that engines can give it
 SETTABLE = {
     "Real": ("Real",),
@@ -119,6 +124,13 @@ class System:
     outside: tuple[str, ...] = ()  # inputs, by component.variable, that only others can feed
     keep: tuple[str, ...] | None = None  # component.variable to record; None: all outputs
     description: str = ""
+    order: str = "jacobi"  # of steps, one of WAYS
+    rates: Mapping[str, float] = field(default_factory=dict)  # s, of components with their own
+
+    def with_step(self, step: float) -> "System":
+        """Return the system with another communication step, s; its rates change as much."""
+        rates = {name: every * (step / self.step) for name, every in self.rates.items()}
+        return replace(self, step=step, rates=rates)
 
     @property
     def parameter_sets(self) -> dict[str, dict[str, dict[str, Value]]]:
@@ -179,11 +191,6 @@ class OpenedSystem:
         return not self.files and not self.python
 
     @property
-    def longest_chain(self) -> int:
-        """Through how many connections values may pass at once; WrongValueError for a loop."""
-        return longest_chain(self.system, self.models, is_assumed=True)
-
-    @property
     def passed_on(self) -> str:
         """An output that a tick at the start may change and another component passes on at once."""
         starts = {c.start for c in self.system.connections}
@@ -231,7 +238,15 @@ class OpenedSystem:
             "inputs of the whole system, which nothing moves here, constant": outside,
         }
         held = [f"{kind}: {', '.join(names)}" for kind, names in kinds.items() if names]
-        return [*self.system.notes, *held]
+        return [*self.system.notes, *self._rounded_rates(), *held]
+
+    def _rounded_rates(self) -> Iterator[str]:
+        """Say which components step at the points nearest to their times."""
+        step = self.system.step
+        for name, every in self.system.rates.items():
+            if not are_whole(0.0, every, step):
+                rate = f"every {number(every)} s is no multiple of the step, {number(step)} s"
+                yield f"{name}: {rate}: it steps at the nearest points"
 
     def with_values(self, variant: str, given: Mapping[str, Any]) -> "OpenedSystem":
         """Replace values of a variant, by ``component.variable``; UserError for a wrong one."""
@@ -358,32 +373,6 @@ def check(path: Path, system: System, models: Mapping[str, Model]) -> None:
     _Checker(path, system, models).check()
 
 
-def longest_chain(system: System, models: Mapping[str, Model], is_assumed: bool = False) -> int:
-    """Return through how many connections in a row values pass at once; not in a circle.
-
-    Outputs whose FMU does not declare dependencies follow from nothing, or `is_assumed`: from all
-    inputs. WrongValueError for an algebraic loop.
-    """
-    causes = {c.end: {c.start} for c in system.connections}
-    for component, model in models.items():
-        ends = {v.name for v in model.variables.values() if v.is_a(INPUTS)}
-        for variable in model.variables.values():
-            known = model.dependencies.get(variable.name, ends if is_assumed else ())
-            if variable.causality == "output":
-                inputs = {f"{component}.{x}" for x in ends.intersection(known)}
-                causes[f"{component}.{variable.name}"] = inputs
-    fed, length = {c.end for c in system.connections}, dict[str, int]()
-    try:
-        for name in TopologicalSorter(causes).static_order():
-            before = (length[cause] for cause in causes.get(name, ()))
-            length[name] = max(before, default=0) + (name in fed)
-    except CycleError as error:
-        way_out = "a state or a sampler must be in between"
-        loop = " -> ".join(error.args[1])
-        raise WrongValueError(f"algebraic loop, {loop}: {way_out}") from error
-    return max(length.values(), default=0)
-
-
 class _Checker:
     def __init__(self, path: Path, system: System, models: Mapping[str, Model]) -> None:
         self.path = path
@@ -399,8 +388,6 @@ class _Checker:
             for connector in component.connectors.values():
                 self.connector(component, connector)
         self.connections()
-        with placed(f"{self.path}: [connections]"):
-            longest_chain(self.system, self.models)
         for variant, components in self.system.parameters.items():
             for component, values in components.items():
                 for name, parameter in values.items():

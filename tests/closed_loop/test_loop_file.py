@@ -240,7 +240,7 @@ def test_a_federation_has_what_samplers_set_at_the_start(parts: Path) -> None:
         federation.run(system, "default", network.free_address())
 
 
-def test_the_master_finds_a_loop_that_fmus_do_not_declare(parts: Path) -> None:
+def test_a_loop_that_fmus_do_not_declare_has_no_solution(parts: Path) -> None:
     """x = x + 2, through both."""
     repacked(
         parts / "Part.fmu", parts / "Open.fmu",
@@ -250,7 +250,7 @@ def test_the_master_finds_a_loop_that_fmus_do_not_declare(parts: Path) -> None:
     file.write_text(file.read_text().replace("Part.fmu", "Open.fmu"))
     with opened(file) as system:
         assert ecos.unsuited(system).startswith("its FMUs do not exclude an algebraic loop")
-        with pytest.raises(UserError, match="the connections form an algebraic loop: "):
+        with pytest.raises(UserError, match=r"^no solution of the algebraic loop of 2 connections .* is off by 1 "):
             run_in_master(system, "default", ["p.x"])
 
 
