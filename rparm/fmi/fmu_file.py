@@ -47,12 +47,18 @@ INSTANCES: dict[tuple[str, str], type[Instance]] = {
     ("2.0", MODEL_EXCHANGE): Fmi2ModelExchange,
     ("3.0", MODEL_EXCHANGE): Fmi3ModelExchange,
 }
+SOURCES = "sources/"  # no run needs them
 BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
 
 
 # ---- Archives ------------------------------------------------------------------------------------
-def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
-    """Unpack an archive, or one file, to an empty folder; bytes by path, or UnreadableError."""
+def unpack(
+    path: Path, folder: Path, kind: str, only: str | None = None, without: str = ""
+) -> dict[str, int]:
+    """Unpack an archive to an empty folder; bytes of all files by path, or UnreadableError.
+
+    If asked for, it is `only` one file, or all but those in a folder.
+    """
     check_regular(path)
     if path.is_dir():
         raise UnreadableError(f"is a folder, expected an {kind}")
@@ -62,7 +68,8 @@ def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict
             entries = archive.infolist()
             _check(entries)
             for entry in entries:
-                if only in (None, entry.filename):
+                left_out = without and entry.filename.startswith(without)
+                if only in (None, entry.filename) and not left_out:
                     where = f"{_shown(entry.filename)} "
                     file = Path(archive.extract(entry, folder))
                     size = file.stat().st_size if is_file(file) else entry.file_size
@@ -217,7 +224,7 @@ class Fmu(AbstractContextManager["Fmu"]):
             library = f"{self.identifier}{LIBRARY_SUFFIX}"
             self.library = self.folder / "binaries" / platform / library
             with placed(self.path):
-                unpack(archive, self.folder, "FMU")
+                unpack(archive, self.folder, "FMU", without=SOURCES)
             try:
                 check_library(self.library)
             except (OSError, UnreadableError) as error:

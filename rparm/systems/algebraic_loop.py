@@ -29,6 +29,8 @@ class AlgebraicLoop:
         self._ends = ends
         self._sources = np.array([component.sources[i] for component, i in ends], dtype=int)
         self.components = list(dict.fromkeys(component for component, _ in ends))
+        for component, i in ends:
+            component.on_loop[i] = True
         variables = [c.instance.fmu.model.variables[c.inputs.names[i]] for c, i in ends]
         self.nominals = np.array([variable.nominal or 1.0 for variable in variables])
         self.solved: np.ndarray | None = None  # inputs and what feeds them, as solved last
@@ -60,8 +62,7 @@ class _Search:
         self._wanted = [self._values[component.sources] for component in self._components]
         others = False  # whether inputs from outside of the loop have changed
         for component, wanted in zip(self._components, self._wanted, strict=True):
-            own = [i for end, i in self._ends if end is component]
-            wanted[own] = component.inputs.view[own]
+            wanted[component.on_loop] = component.inputs.view[component.on_loop]
             others = others or not np.array_equal(wanted, component.inputs.view)
         apart = self._values[self._sources] - u
         if not others and np.array_equal(self._state(u), self._loop.solved):

@@ -45,7 +45,7 @@ class ConnectedInstance:
         self.outputs = instance.reals(outputs, memory)
         self.inputs = instance.reals(inputs)
         self.kept = np.zeros((2, len(inputs)))  # their sources and slopes as its step began
-        self.is_on_loop = bool(solved)
+        self.on_loop = np.zeros(len(inputs), dtype=bool)  # inputs that loops solve for
 
         # slopes: of the FMU, else of the line through the last two values
         model = instance.fmu.model
@@ -123,7 +123,7 @@ class ConnectedInstance:
 
     def end_lines(self, length: float) -> None:
         """Set where these lines end, for an FMU that takes no slopes and for algebraic loops."""
-        if len(self.sources) and (self._lines is None or self.is_on_loop):
+        if len(self.sources) and (self._lines is None or self.on_loop.any()):
             values, slopes = self.kept
             self.set_inputs(values + length * slopes)
 

@@ -40,7 +40,7 @@ def longest_chain(connections: Sequence[Connection], models: Mapping[str, Model]
 def loops(
     connections: Iterable[Connection], models: Mapping[str, Model]
 ) -> list[tuple[Connection, ...]]:
-    """Return the connections of each algebraic loop, in their order."""
+    """Return the connections of each algebraic loop; one that follows others is behind them."""
     connections = list(connections)
     causes = direct(models) | {c.end: {c.start} for c in connections}
     reached = {c.end: _behind(c.end, causes) for c in connections}
@@ -49,7 +49,7 @@ def loops(
         circle = frozenset(x for x in reached[c.end] if c.end in reached.get(x, ()))
         if circle:
             found.setdefault(circle, []).append(c)
-    return [tuple(loop) for loop in found.values()]
+    return sorted(map(tuple, found.values()), key=lambda loop: len(reached[loop[0].end]))
 
 
 def _behind(name: str, causes: Mapping[str, Iterable[str]]) -> set[str]:

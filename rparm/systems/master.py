@@ -211,6 +211,9 @@ class Master(AbstractContextManager["Master"]):
         self.due = list(self.components.values())  # that the last step has brought to its end
 
     def _loop(self, circle: Sequence[Connection]) -> AlgebraicLoop:
+        rank = {name: i for i, name in enumerate(self.components)}
+        # the order of connections does not change the rounding
+        circle = sorted(circle, key=lambda c: (rank[c.end_component], c.end_connector))
         ends = [self.components[c.end_component] for c in circle]
         places = [
             component.inputs.names.index(c.end_connector)
@@ -261,7 +264,7 @@ class Master(AbstractContextManager["Master"]):
                 return
             before = self.values.copy()
             for component in self.due:
-                if not component.is_on_loop:
+                if not component.on_loop.any():
                     with component.instance.explained(when):
                         component.set_inputs(self.values[component.sources])
         names = ", ".join([*(self.names[i] for i in changing), *switched])
@@ -362,6 +365,7 @@ class Master(AbstractContextManager["Master"]):
                 component.set_inputs(component.kept[0])
             component.instance.do_step(begin, length, goes_back=True)
             if self.extrapolates:
+                component.read_slopes()
                 component.end_lines(length)
         except FMICallException as error:
             when = f"in the step from t = {begin!r} s"
@@ -371,8 +375,6 @@ class Master(AbstractContextManager["Master"]):
     def _read(self, component: ConnectedInstance, end: float) -> None:
         try:
             component.read()
-            if self.extrapolates:
-                component.read_slopes()
         except FMICallException as error:
             raise component.instance.failure(error, f"at t = {end!r} s") from error
         check_finite(component.name, component.outputs, f"at t = {end!r} s")

@@ -215,10 +215,16 @@ class OpenedSystem:
 
     @contextmanager
     def unpacked_fmus(self, names: Iterable[str] | None = None) -> Iterator[dict[str, Fmu]]:
-        """Return the FMUs of all components, or of those named, in this order."""
+        """Return the FMUs of all components, or of those named, in this order; each once."""
         with ExitStack() as stack:
-            wanted = self.models if names is None else names
-            yield {name: stack.enter_context(self.unpacked_fmu(name)) for name in wanted}
+            opened: dict[object, Fmu] = {}
+            found = {}
+            for name in self.models if names is None else names:
+                of = name if name in self.python else (self.fmu(name), self.files.get(name))
+                if of not in opened:
+                    opened[of] = stack.enter_context(self.unpacked_fmu(name))
+                found[name] = opened[of]
+            yield found
 
     @property
     def notes(self) -> list[str]:

@@ -153,13 +153,33 @@ def test_initialization_follows_direct_feedthrough(oscillator: Fmu, sequence: st
     np.testing.assert_allclose(slope, [9.0 * 1.0 - 1.3 * of_input], rtol=1e-14)
 
 
-def test_an_algebraic_loop_is_named(oscillator: Fmu) -> None:
-    loop = [Connection("a", "a", "b", "u"), Connection("b", "a", "a", "u")]
-    with (
-        Master({"a": oscillator, "b": oscillator}, loop) as master,
-        pytest.raises(UserError, match=r"algebraic loop: .*a\.a, .*b\.a"),
-    ):
+LOOPED = [Connection("a", "a", "b", "u"), Connection("b", "a", "a", "u")]
+
+
+@pytest.mark.parametrize("order", ["jacobi", "gauss_seidel"])
+@pytest.mark.parametrize("inputs", ["held", "extrapolated"])
+def test_an_algebraic_loop_is_solved_at_each_point(
+    oscillator: Fmu, order: str, inputs: str
+) -> None:
+    """The accelerations: a = -4 x_a + 0.7 b and b = -9 x_b - 1.3 a."""
+    with Master({"a": oscillator, "b": oscillator}, LOOPED, order, inputs) as master:
         master.initialize(0.0, None, PARAMETERS)
+        for _ in range(4):
+            x, y, *found = master.values[places(master, "a.x", "b.x", "a.a", "b.a")]
+            expected = np.linalg.solve([[1, -0.7], [1.3, 1]], [-4 * x, -9 * y])
+            np.testing.assert_allclose(found, expected, rtol=1e-14)
+            master.advance(master.time + H)
+
+
+def test_an_algebraic_loop_without_solution_is_named(oscillator: Fmu) -> None:
+    changed = {name: values | {"gain": 1.0} for name, values in PARAMETERS.items()}
+    with (
+        Master({"a": oscillator, "b": oscillator}, LOOPED) as master,
+        pytest.raises(
+            UserError, match=r"^no solution .* loop of 2 connections .*: \w\.a -> \w\.u is off"
+        ),
+    ):
+        master.initialize(0.0, None, changed)
 
 
 @pytest.mark.parametrize("inputs", ["held", "extrapolated"])
