@@ -6,6 +6,8 @@ docs/systems.md.
 
 import math
 import re
+from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,11 +17,14 @@ from scipy.linalg import expm
 
 import rparm
 from rparm import building
+from rparm.fmi.fmu_file import Fmu
+from rparm.systems.feedthrough import sequence
+from rparm.systems.master import Master
+from rparm.systems.structure import WAYS, Connection
 from tests.support.rparm_project import repacked
 
 STEP, STEPS = 0.1, 12
 ORDERS = ("jacobi", "gauss_seidel", "extrapolated")
-SEEDS = range(100)
 NUMBERS = [f"{m}{i}" for m in "abcd" for i in range(1, 5)]
 # y1 follows both inputs at once, y2 only u2; of the other part no output follows
 PART = """
@@ -230,8 +235,11 @@ class Random:
                 part = self.parts[i]
                 part.u, part.y = inputs[i], part.C @ part.x + part.D @ inputs[i]
 
-    def run(self, order: str) -> np.ndarray:
-        """Return the outputs at all points, (STEPS + 1, outputs), as rows are read."""
+    def run(self, order: str, as_read: bool = False) -> np.ndarray:
+        """Return the outputs at all points, (STEPS + 1, outputs), as steps leave them or `as_read`.
+
+        In Jacobi order rows of a file's system are read after the next inputs have been set.
+        """
         on_loop = {self.fed[end] for loop in self.loops() for end in loop}
         connected = set(self.fed.values())
         drawn = on_loop | {e for e in connected if "plain" in self.parts[e[0]].fmu}
@@ -278,7 +286,7 @@ class Random:
                         if (i, j) in drawn and is_sloped:
                             part.dy[j] = (part.y[j] - y[j]) / (end - time)
                 ahead |= set(group)
-            rows.append(self.row(due, rows[-1], sets=order == "jacobi"))
+            rows.append(self.row(due, rows[-1], sets=as_read and order == "jacobi"))
         return np.array(rows)
 
     def is_due(self, part: Part, n: int) -> bool:
@@ -324,23 +332,61 @@ class Random:
         return found
 
 
+@pytest.fixture(scope="module")
+def fmus(parts: Path) -> Iterator[dict[str, Fmu]]:
+    """The FMUs of all parts, by their paths in the folder."""
+    names = [f"{v}{name}.fmu" for v in ("", "fmi3/", "plain/") for name in ("Direct", "Lagging")]
+    with ExitStack() as stack:
+        yield {name: stack.enter_context(Fmu(parts / name)) for name in names}
+
+
+def mastered(system: Random, order: str, fmus: dict[str, Fmu]) -> np.ndarray:
+    """Return the outputs right after each step."""
+    used = {f"p{i}": fmus[part.fmu] for i, part in enumerate(system.parts)}
+    ends = [
+        Connection(f"p{k}", f"y{m + 1}", f"p{i}", f"u{j + 1}")
+        for (i, j), (k, m) in system.fed.items()
+    ]
+    names = sorted(used, key=lambda name: int(name[1:]) not in system.inner)
+    if order == "gauss_seidel":
+        names = sequence(names, ends, {name: fmu.model for name, fmu in used.items()})
+    values = {
+        f"p{i}": {f"{x.lower()}{n + 1}": float(v) for x in "ABCD"
+                  for n, v in enumerate(getattr(part, x).ravel())}
+        for i, part in enumerate(system.parts)
+    }  # fmt: skip
+    rates = {f"p{i}": part.every for i, part in enumerate(system.parts) if part.every}
+    chosen = {name: used[name] for name in names}
+    with Master(chosen, ends, *WAYS[order], rates=rates) as master:
+        master.initialize(0.0, None, values)
+        rows = master.run(STEP * np.arange(STEPS + 1))
+        return rows[:, [master.names.index(f"p{i}.y{j}") for i in range(len(used)) for j in (1, 2)]]
+
+
 @pytest.mark.parametrize("order", ORDERS)
-def test_random_systems_follow_recursions(parts: Path, order: str) -> None:
+def test_random_systems_follow_recursions(fmus: dict[str, Fmu], order: str) -> None:
     loops, late = 0, 0
-    for seed in SEEDS:
+    for seed in range(100):
         system = Random(seed)
-        names = [f"{system.name(i, False)}.y{j}" for i in range(len(system.parts)) for j in (1, 2)]
-        flat = rparm.System(system.write(parts, order, False, f"s{seed}")).run()
-        found = np.column_stack([flat[name] for name in names])
+        found = mastered(system, order, fmus)
         expected = Random(seed).run(order)
-        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-9, err_msg=f"seed {seed}")
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9, err_msg=f"seed {seed}")
         loops += bool(system.loops())
         late += any(part.every == 2.5 * STEP for part in system.parts)
-        if seed % 4 == 0:
-            nested = rparm.System(system.write(parts, order, True, f"n{seed}")).run()
-            for i in range(len(system.parts)):
-                for j in (1, 2):
-                    np.testing.assert_array_equal(
-                        nested[f"{system.name(i, True)}.y{j}"], flat[f"p{i}.y{j}"]
-                    )
     assert loops > 20 and late > 20
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("seed", [0, 4, 5, 14])
+def test_a_nested_system_has_the_bits_of_a_flat_one(parts: Path, order: str, seed: int) -> None:
+    """With rates, and, but for the first, with loops; rows are read as in the recursion."""
+    system = Random(seed)
+    flat = rparm.System(system.write(parts, order, False, f"flat{seed}")).run()
+    nested = rparm.System(system.write(parts, order, True, f"nested{seed}")).run()
+    names = [f"y{j}" for j in (1, 2)]
+    expected = Random(seed).run(order, as_read=True).T.reshape(len(system.parts), 2, -1)
+    for i, part in enumerate(expected):
+        for name, values in zip(names, part, strict=True):
+            found = flat[f"p{i}.{name}"]
+            np.testing.assert_allclose(found, values, rtol=0, atol=1e-9)
+            np.testing.assert_array_equal(nested[f"{system.name(i, True)}.{name}"], found)
