@@ -26,6 +26,7 @@ OK, DISCARD, ERROR, FATAL = 0, 2, 3, 4  # from DISCARD on, a status stops a run
 TERMINATED = 100  # no status of FMI: the FMU asks to end the simulation
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")  # the last: FMI 2.0
 MESSAGES_KEPT = 20
+ENDS = re.compile("the simulation ends (at t = .*)")  # what FMUs of this project say
 # types of the variables that messages of FMI 2.0 refer to, by a letter
 REFERRED = {"r": ("Real",), "i": ("Integer", "Enumeration"), "b": ("Boolean",), "s": ("String",)}
 
@@ -180,11 +181,22 @@ class Instance(ABC):
 
     def failure(self, error: FMICallException, when: str) -> UserError:
         """Return the error to raise after a function of the FMU failed."""
+        if ended := self._ended(error):
+            return self.ended(ended)
         self._status = error.status
         known = error.status in range(len(STATUS_NAMES))
         name = STATUS_NAMES[error.status] if known else str(error.status)
         text = f"{error.function} {when} failed ({name}){self._last_message()}"
         return UserError(f"{self.name}: {text}")
+
+    def _ended(self, error: FMICallException) -> str:
+        """Return when the FMU has ended the simulation, if it failed for that; else nothing."""
+        return ""
+
+    def ended(self, when: str) -> UserError:
+        """Return the error to raise after the FMU has ended the simulation."""
+        own = ENDS.search(self.messages[-1]) if self.messages else None
+        return UserError(f"{self.name}: the FMU ends the simulation {own[1] if own else when}")
 
     @contextmanager
     def explained(self, when: str) -> Iterator[None]:
