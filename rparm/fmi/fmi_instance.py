@@ -111,6 +111,7 @@ class Instance(ABC):
         self.smooth_inputs = list(smooth_inputs)
         self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)  # of the FMU, the last ones
         self._status = OK  # of the call that failed
+        self._said = OK  # of the last message
         self._initialized = False
         self.fmi = self._load()
 
@@ -160,6 +161,7 @@ class Instance(ABC):
     def _keep_unless_ok(self, status: int, message: bytes | None) -> None:
         """Keep a message of the FMU as one line in `messages`, but none of status OK."""
         if status != OK:
+            self._said = status
             self.messages.append(self._read_text((message or b"").decode(errors="replace")))
 
     def _read_text(self, text: str) -> str:
@@ -195,8 +197,10 @@ class Instance(ABC):
 
     def ended(self, when: str) -> UserError:
         """Return the error to raise after the FMU has ended the simulation."""
-        own = ENDS.search(self.messages[-1]) if self.messages else None
-        return UserError(f"{self.name}: the FMU ends the simulation {own[1] if own else when}")
+        said = self.messages[-1] if self.messages else ""
+        own = ENDS.search(said)
+        why = own[1] if own else f"{when}: {said}" if said else when
+        return UserError(f"{self.name}: the FMU ends the simulation {why}")
 
     @contextmanager
     def explained(self, when: str) -> Iterator[None]:

@@ -18,6 +18,7 @@ from fmpy.fmi1 import FMICallException
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import (
     DISCARD,
+    ERROR,
     Call,
     InputPolynomials,
     Instance,
@@ -113,7 +114,8 @@ class Fmi2Instance(Instance):
         self.fmi.fmi2DoStep(self.fmi.component, start, length, final)
 
     def _ended(self, error: FMICallException) -> str:
-        if error.function == "fmi2DoStep" and error.status == DISCARD:
+        is_discarded = error.function == "fmi2DoStep" and error.status == DISCARD
+        if is_discarded and self._said < ERROR:  # PythonFMU says the same of what Python raises
             with suppress(FMICallException, AttributeError):  # unless it cannot say so
                 if self.fmi.getBooleanStatus(fmi2.fmi2Terminated):
                     return f"at t = {self.fmi.getRealStatus(fmi2.fmi2LastSuccessfulTime)!r} s"
