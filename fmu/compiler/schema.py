@@ -56,6 +56,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
     "where": {"type": "object", "propertyNames": WORD, "additionalProperties": EXPRESSION},
     **dict.fromkeys(("derivative", "value", "equation", "when", "while"), EXPRESSION),
     **dict.fromkeys(("every", "offset", FOR), EXPRESSION),
+    "terminate": TEXT | {"minLength": 1, "maxLength": reader.LONGEST_MESSAGE},
     "nominal": ABOVE_0,
     "start": {},
     "variability": {"enum": ["fixed", "discrete"]},
@@ -239,5 +240,7 @@ def _terminal() -> Schema:
 def _change(keys: tuple[str, ...]) -> Schema:
     """Return the schema of an event or sampler, which needs the first of its keys and an effect."""
     some = {"minProperties": 1}
-    effects = [{"required": [key], "properties": {key: some}} for key in ("set", "reinit")]
+    effects = [
+        {"required": [key], "properties": {key: some}} for key in reader.EFFECTS if key in keys
+    ]
     return _keys(keys, keys[0]) | {"anyOf": effects}

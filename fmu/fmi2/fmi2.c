@@ -284,7 +284,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
     const bool has_next_time = isfinite(update.next_time);
     *fmi2eventInfo = (fmi2EventInfo){
         .newDiscreteStatesNeeded = update.is_incomplete ? fmi2True : fmi2False,
-        .terminateSimulation = fmi2False,
+        .terminateSimulation = update.has_ended ? fmi2True : fmi2False,
         .nominalsOfContinuousStatesChanged = fmi2False,
         .valuesOfContinuousStatesChanged = update.states_changed ? fmi2True : fmi2False,
         .nextEventTimeDefined = has_next_time ? fmi2True : fmi2False,
@@ -310,7 +310,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
         return fmi2Error;
     }
     *enterEventMode = instance_complete_step(instance);
-    *terminateSimulation = fmi2False;
+    *terminateSimulation = instance_has_ended(instance) ? fmi2True : fmi2False;
     return fmi2OK;
 }
 
@@ -433,10 +433,11 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
     if (s != fmi2Terminated) {
         return no_status(c, CALL_fmi2GetBooleanStatus, value);
     }
-    if (fmi_enter_with(c, CALL_fmi2GetBooleanStatus, 1, value, value) == NULL) {
+    const struct instance *instance = fmi_enter_with(c, CALL_fmi2GetBooleanStatus, 1, value, value);
+    if (instance == NULL) {
         return fmi2Error;
     }
-    *value = fmi2False; // the FMU never ends a simulation by itself
+    *value = instance_has_ended(instance) ? fmi2True : fmi2False;
     return fmi2OK;
 }
 

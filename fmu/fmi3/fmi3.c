@@ -297,7 +297,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     const enum status status = instance_update_discrete_states(entered, &update);
     const bool has_next_time = isfinite(update.next_time);
     *discreteStatesNeedUpdate = update.is_incomplete;
-    *terminateSimulation = fmi3False;
+    *terminateSimulation = update.has_ended;
     *nominalsOfContinuousStatesChanged = fmi3False;
     *valuesOfContinuousStatesChanged = update.states_changed;
     *nextEventTimeDefined = has_next_time;
@@ -495,14 +495,15 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     }
     const enum status status =
         instance_do_step(entered, currentCommunicationPoint, communicationStepSize, &fmi->options);
-    if (status != STATUS_OK) {
+    if (status != STATUS_OK && status != STATUS_ENDED) {
         return result(instance, status);
     }
     *eventHandlingNeeded =
         fmi->base.kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(entered);
-    *terminateSimulation = fmi3False;
+    *terminateSimulation = status == STATUS_ENDED;
     *lastSuccessfulTime = instance_time(entered);
-    *earlyReturn = *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
+    *earlyReturn = fmi->early_return_allowed &&
+                   *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
     return fmi3OK;
 }
 
@@ -525,7 +526,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
         return fmi3Error;
     }
     *enterEventMode = instance_complete_step(entered);
-    *terminateSimulation = fmi3False;
+    *terminateSimulation = instance_has_ended(entered);
     return fmi3OK;
 }
 

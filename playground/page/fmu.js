@@ -268,6 +268,10 @@ class Fmu3 extends Fmu {
   doStep(time, length) {
     const told = this.scratch; // three Booleans and a time
     this.call('fmi3DoStep', time, length, 1, told, told + 1, told + 2, told + 8);
+    if (new Uint8Array(this.buffer, told + 1, 1)[0]) {
+      const [reached] = new Float64Array(this.buffer, told + 8, 1);
+      throw new FmuError(this.description.name, `the FMU ends the simulation at t = ${reached} s`);
+    }
   }
 
   #single({kind, reference}) {

@@ -368,5 +368,5 @@ class Stepper:
             return
         instance = self._instances[component]
         if status == TERMINATED:
-            raise UserError(f"{instance.name}: the FMU ends the simulation {when}")
+            raise instance.ended(when)
         raise instance.failure(FMICallException(function_names(instance)[function], status), when)

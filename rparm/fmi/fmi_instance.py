@@ -26,6 +26,7 @@ OK, DISCARD, ERROR, FATAL = 0, 2, 3, 4  # from DISCARD on, a status stops a run
 TERMINATED = 100  # no status of FMI: the FMU asks to end the simulation
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")  # the last: FMI 2.0
 MESSAGES_KEPT = 20
+ENDS = re.compile("the simulation ends (at t = .*)")  # what FMUs of this project say
 # types of the variables that messages of FMI 2.0 refer to, by a letter
 REFERRED = {"r": ("Real",), "i": ("Integer", "Enumeration"), "b": ("Boolean",), "s": ("String",)}
 
@@ -110,6 +111,7 @@ class Instance(ABC):
         self.smooth_inputs = list(smooth_inputs)
         self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)  # of the FMU, the last ones
         self._status = OK  # of the call that failed
+        self._said = OK  # of the last message
         self._initialized = False
         self.fmi = self._load()
 
@@ -159,6 +161,7 @@ class Instance(ABC):
     def _keep_unless_ok(self, status: int, message: bytes | None) -> None:
         """Keep a message of the FMU as one line in `messages`, but none of status OK."""
         if status != OK:
+            self._said = status
             self.messages.append(self._read_text((message or b"").decode(errors="replace")))
 
     def _read_text(self, text: str) -> str:
@@ -180,11 +183,24 @@ class Instance(ABC):
 
     def failure(self, error: FMICallException, when: str) -> UserError:
         """Return the error to raise after a function of the FMU failed."""
+        if ended := self._ended(error):
+            return self.ended(ended)
         self._status = error.status
         known = error.status in range(len(STATUS_NAMES))
         name = STATUS_NAMES[error.status] if known else str(error.status)
         text = f"{error.function} {when} failed ({name}){self._last_message()}"
         return UserError(f"{self.name}: {text}")
+
+    def _ended(self, error: FMICallException) -> str:
+        """Return when the FMU has ended the simulation, if it failed for that; else nothing."""
+        return ""
+
+    def ended(self, when: str) -> UserError:
+        """Return the error to raise after the FMU has ended the simulation."""
+        said = self.messages[-1] if self.messages else ""
+        own = ENDS.search(said)
+        why = own[1] if own else f"{when}: {said}" if said else when
+        return UserError(f"{self.name}: the FMU ends the simulation {why}")
 
     @contextmanager
     def explained(self, when: str) -> Iterator[None]:

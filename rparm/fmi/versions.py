@@ -17,6 +17,8 @@ from fmpy.fmi1 import FMICallException
 
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import (
+    DISCARD,
+    ERROR,
     Call,
     InputPolynomials,
     Instance,
@@ -110,6 +112,14 @@ class Fmi2Instance(Instance):
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
         final = fmi2.fmi2False if goes_back else fmi2.fmi2True
         self.fmi.fmi2DoStep(self.fmi.component, start, length, final)
+
+    def _ended(self, error: FMICallException) -> str:
+        is_discarded = error.function == "fmi2DoStep" and error.status == DISCARD
+        if is_discarded and self._said < ERROR:  # PythonFMU says the same of what Python raises
+            with suppress(FMICallException, AttributeError):  # unless it cannot say so
+                if self.fmi.getBooleanStatus(fmi2.fmi2Terminated):
+                    return f"at t = {self.fmi.getRealStatus(fmi2.fmi2LastSuccessfulTime)!r} s"
+        return ""
 
     def snapshot(self) -> Snapshot:
         calls = (getattr(self.fmi, f"fmi2{name}FMUstate") for name in ("Get", "Set", "Free"))
@@ -230,8 +240,7 @@ class Fmi3Instance(Instance):
                 error, self._raised = self._raised, None
                 raise error
         if self._terminates.value:
-            time = self._time.value
-            raise UserError(f"{self.name}: the FMU ends the simulation at t = {time!r} s")
+            raise self.ended(f"at t = {self._time.value!r} s")
 
     def snapshot(self) -> Snapshot:
         calls = (getattr(self.fmi, f"fmi3{name}FMUState") for name in ("Get", "Set", "Free"))
@@ -266,7 +275,7 @@ class _ModelExchange(Instance):
             for _ in range(MOST_UPDATES):
                 needed, terminates, _, _, has_next, time = self._update_discrete_states()
                 if terminates:
-                    raise UserError(f"{self.name}: the FMU ends the simulation at its start")
+                    raise self.ended("at its start")
                 if not needed:
                     break
             else:

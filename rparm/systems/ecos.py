@@ -28,6 +28,7 @@ import numpy as np
 
 from rparm import project
 from rparm.errors import StoppedError, UserError, WrongValueError, one_line
+from rparm.fmi.fmi_instance import ENDS
 from rparm.interruption import run_group, temporary_folder
 
 if TYPE_CHECKING:
@@ -191,6 +192,8 @@ def _check_messages(
     for match in messages:
         if match["status"] in BAD:
             where = f"{variant}: component {_sender(ssp, match)}"
+            if ended := ENDS.search(match["text"]):
+                raise UserError(f"{where} ends the simulation {ended[1]}")
             when = "in initialization" if len(times) == 1 else f"by t = {times[-1]:.6g} s"
             raise UserError(f"{where} failed {when} ({match['status'].lower()}): {match['text']}")
     if len(times) != ssp.system.steps + 1:

@@ -49,6 +49,7 @@ static enum status update_discrete_states(struct instance *instance, bool *state
 enum status instance_update_discrete_states(struct instance *instance,
                                             struct discrete_update *update) {
     const enum status status = update_discrete_states(instance, &update->states_changed);
+    update->has_ended = instance_explain_end(instance, NULL, 0);
     update->next_time = instance_next_time(instance);
     update->is_incomplete =
         instance->is_integrated_outside && update->next_time <= instance->state.time.s;

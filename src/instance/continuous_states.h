@@ -11,6 +11,7 @@ NONNULL void instance_enter_event_mode(struct instance *instance);
 MUST_CHECK NONNULL bool instance_complete_step(struct instance *instance);
 
 struct discrete_update {
+    bool has_ended;      /* true if an event has ended the simulation */
     bool states_changed; /* true if states that are integrated outside have jumped */
     bool is_incomplete;  /* true with integration from outside if the next time event is not later
                             than now */

@@ -104,7 +104,13 @@ static enum status update(struct instance *instance, const bool *triggered, doub
         .reason_size = sizeof reason,
     };
     const double passed = event.is_timed ? instance_next_time(instance) : -INFINITY;
+    const bool had_ended = instance_explain_end(instance, NULL, 0);
     const enum status status = events->update(instance->memory.values, &event);
+    char end[1024];
+    if (status == STATUS_OK && !had_ended && instance_explain_end(instance, end, sizeof end)) {
+        message_write(&instance->sink, STATUS_ENDED, "the simulation ends at t = %.17g: %s",
+                      event.t, end);
+    }
     if (status == STATUS_OK && event.is_timed) {
         return check_next_time(instance, passed);
     }

@@ -173,6 +173,13 @@ static inline double instance_next_time(const struct instance *instance) {
                                                        : INFINITY;
 }
 
+/* True if an event has ended the simulation; its name and reason go to text (size bytes). */
+static inline bool instance_explain_end(const struct instance *instance, char *text, size_t size) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->has_ended != NULL &&
+           events->has_ended(instance->memory.values, instance->state.time.s, text, size);
+}
+
 /* Lets the searches for solutions of equations begin at those of the present values; where present
  * modes have none, at those in other modes. A search that begins there finds the same bits. */
 NONNULL void instance_move_anchors(struct instance *instance);

@@ -22,6 +22,7 @@ struct step {
     double drift;            /* drift of the communication points up to the begin of the step, s */
     bool is_early;           /* true if `end` has become earlier */
     bool is_over;            /* true if the step ends where it is */
+    bool has_ended;          /* true if an event has ended the simulation */
     bool is_kept;            /* true if options->undo has the instance before the step */
     enum status answer;      /* last status of options->accept */
     struct event_counts events; /* events so far */
@@ -352,6 +353,16 @@ static enum status integrate(struct step *step, enum continuation continuation) 
 
 /* ---- Events --------------------------------------------------------------------------------- */
 
+/* Ends the step at the present time if an event has ended the simulation. */
+static void end_with_simulation(struct step *step) {
+    const struct clock_time now = step->instance->state.time;
+    step->has_ended = instance_has_ended(step->instance);
+    if (step->has_ended && clock_difference(step->end, now) > 0.0) {
+        step->is_early = true;
+        step->end = now;
+    }
+}
+
 /* Decides the modes at the beginning of a step, and how the integrator continues from there. */
 static enum status begin_modes(struct step *step, enum continuation *continuation) {
     struct instance *instance = step->instance;
@@ -373,6 +384,7 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
         }
     }
     step->has_message = status != STATUS_OK;
+    end_with_simulation(step);
     set_part(step);
     return status;
 }
@@ -417,6 +429,7 @@ static enum status handle_event(struct step *step) {
         status = instance_update_modes(instance, instance->triggered);
     }
     step->has_message = status != STATUS_OK;
+    end_with_simulation(step);
     if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
         state->event_point = EVENT_HANDLED;
         state->cut_end = end;
@@ -426,8 +439,9 @@ static enum status handle_event(struct step *step) {
 
 /* True at the end of the step, if no other time event is there. */
 static bool is_done(const struct step *step) {
-    return !(clock_difference(step->end, step->instance->state.time) > 0.0) &&
-           (step->options->at_event != EVENTS_PASSED || !step->meets_time_event);
+    return step->has_ended ||
+           (!(clock_difference(step->end, step->instance->state.time) > 0.0) &&
+            (step->options->at_event != EVENTS_PASSED || !step->meets_time_event));
 }
 
 /* ---- Begin and end -------------------------------------------------------------------------- */
@@ -470,7 +484,7 @@ static enum status begin(struct instance *instance, double communication_point, 
         step->end = resumed_end(instance, step->end);
     }
     instance->step_met_event = false;
-    return STATUS_OK;
+    return instance_has_ended(instance) ? STATUS_ENDED : STATUS_OK;
 }
 
 /* Chooses how the integrator continues. Returns false if there is nothing to integrate, or an
@@ -555,6 +569,7 @@ enum status instance_do_step(struct instance *instance, double communication_poi
     if (goes_on) {
         keep(&step);
         status = begin_modes(&step, &continuation);
+        goes_on = !step.has_ended;
     }
     while (goes_on && status == STATUS_OK) {
         status = integrate(&step, continuation);
@@ -590,9 +605,13 @@ enum status instance_do_step(struct instance *instance, double communication_poi
         return fail(&step, step.answer);
     }
     state->drift = step.drift;
-    return STATUS_OK;
+    return step.has_ended ? STATUS_ENDED : STATUS_OK;
 }
 
 bool instance_met_event(const struct instance *instance) {
     return instance->step_met_event;
+}
+
+bool instance_has_ended(const struct instance *instance) {
+    return instance_explain_end(instance, NULL, 0);
 }

@@ -38,10 +38,14 @@ struct step_options {
  * (zero-order hold), or polynomials if derivatives were set. options: NULL for none. Returns
  * STATUS_INVALID_TIME if step_size is not > 0, communication_point is not where the instance is
  * (clock_slack), or the end is past the stop time. If the integration ends early (severity
- * discard), instance_time is the time it reached, with the states at that time. */
+ * discard), instance_time is the time it reached, with the states at that time. STATUS_ENDED: an
+ * event has ended the simulation there; further steps do nothing and return it, too. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_do_step(struct instance *instance, double communication_point, double step_size,
                      const struct step_options *options);
 
 /* True if the last step passed an event, or left it. */
 NONNULL bool instance_met_event(const struct instance *instance);
+
+/* True if an event has ended the simulation. */
+NONNULL bool instance_has_ended(const struct instance *instance);

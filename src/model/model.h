@@ -121,6 +121,10 @@ struct model_events {
     /* Writes the modes, states and discrete states after an event, from all values that are set:
      * parameters, inputs, states, modes. If there is no event, a second call changes nothing. */
     enum status (*update)(void *values, const struct event *event);
+
+    /* True if an event has ended the simulation: its name and reason go to text (size bytes) as one
+     * line. NULL if no event does so. */
+    bool (*has_ended)(const void *values, double t, char *text, size_t size);
 };
 
 /* ---- Taylor series -------------------------------------------------------------------------- */

@@ -226,6 +226,9 @@ static enum status run_due_events(const struct call *call, const struct event *e
             status = perform(call, i, event);
             call->active[i] = 1;
             *fires = true;
+            if (model->ends != NULL && model->ends[i] && call->active[model->event_count] == 0) {
+                call->active[model->event_count] = 1 + i;
+            }
             if (status == STATUS_OK && is_last) {
                 add_name(event, model->change_names[i]);
             }

@@ -63,8 +63,9 @@ struct given {
 
 struct relations {
     size_t values_size;
-    /* int[]: 1 if initialization has ended; the mode of each relation; 1 per event that is due; 0;
-     * the number of each segment; counts of the model */
+    /* int[]: 1 if initialization has ended; the mode of each relation; 1 per event that is due;
+     * number from 1 of the event that has ended the simulation, or 0; the number of each segment;
+     * counts of the model */
     struct range modes;
     size_t states; /* offset of the states */
     /* double[], discrete states of the model: with samplers first the start time, s, and the number
@@ -75,10 +76,11 @@ struct relations {
     const struct relation *relation;
     const struct segment *segment;
     const struct count *count;
-    const double *nominal;           /* of each state */
-    const bool *is_circular;         /* of each relation: its distance follows from its own mode.
-                                        NULL if there is none */
-    const char *const *names;        /* of relations; NULL if none is circular */
+    const double *nominal;    /* of each state */
+    const bool *is_circular;  /* of each relation: its distance follows from its own mode.
+                                 NULL if there is none */
+    const char *const *names; /* of relations; NULL if none is circular */
+    const bool *ends;         /* of each event: true if it ends the simulation. NULL if none does */
     const char *const *change_names; /* of events, then of samplers */
     const char *const *every_names;  /* of the period of each sampler */
     const struct assignment *assignment;

@@ -63,6 +63,8 @@ bool relations_are_plausible(const struct relations *model, const void *values) 
         } else if (i >= segments) {
             first = model->segment[i - segments].first;
             last = model->segment[i - segments].last;
+        } else if (i == segments - 1 && model->ends != NULL) {
+            last = model->event_count;
         }
         are_fine = are_fine && modes[i] >= first && modes[i] <= last;
     }

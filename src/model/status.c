@@ -113,7 +113,7 @@ void message_write(const struct message_sink *sink, enum status status, const ch
         return;
     }
 
-    char text[512];
+    char text[1024];
     va_list arguments;
     va_start(arguments, format);
     message_format(text, sizeof text, format, arguments);

@@ -25,6 +25,7 @@ enum severity {
       "the integrator took all internal steps allowed by max_internal_steps")                      \
     X(STATUS_TOO_MANY_EVENTS, SEVERITY_DISCARD, "there were too many events")                      \
     X(STATUS_NO_CONVERGENCE, SEVERITY_DISCARD, "the integrator cannot reach its tolerance")        \
+    X(STATUS_ENDED, SEVERITY_DISCARD, "an event has ended the simulation")                         \
     X(STATUS_INVALID_ARGUMENT, SEVERITY_ERROR, "an argument is not valid")                         \
     X(STATUS_INVALID_PARAMETERS, SEVERITY_ERROR, "the parameters are inconsistent")                \
     X(STATUS_INVALID_TIME, SEVERITY_ERROR, "the times of a step do not fit")                       \

@@ -42,7 +42,7 @@ VALUES = (0, -1, 1e999, 1.5, True, "", "x", "1", "a b", [], [1, 2], ["x"], {}, {
 OF_MODELS = re.compile(
     r"unknown (key|section)|missing|no variables|Windows|is reserved|in modes already|a control"
     r"|implicit form|none reserved|'\^2'|'a b': expected|line 7|start: expected (a |true)|has more"
-    r"|(type|file|nominal = 0|arguments|modes|name): expected"
+    r"|(type|file|nominal = 0|arguments|modes|name|terminate): expected"
     r"|\[(inputs|outputs|where|experiment|events\.('0'|when))\](: \w+)?: expected"
     r"|expected (true or false|set or reinit|a name that is)"
 )

@@ -22,9 +22,11 @@ from ..units import parsed
 from .content import (
     INTEGER,
     OPTIONS,
+    PLACEHOLDER,
     SWITCHES,
     Change,
     Element,
+    Event,
     Expression,
     ModelFile,
     ModelFileError,
@@ -41,7 +43,6 @@ RUN = (".fmu", ".ssp", ".py")  # files that only `system` takes
 MOST_LEVELS = 20
 FREE = ("time", *CONSTANTS)  # names that every file has
 QUANTITY = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
-PLACEHOLDER = re.compile(r"\{(\w+(?:\[[0-9,]+\])?)\}")
 OF_CHANGE = re.compile(r"\[(sampled|events)\.(.+)\]")
 
 
@@ -204,8 +205,8 @@ class Components:
         file.events += map(names.change, part.events)
         file.happening |= {names.of(name): kind for name, kind in part.happening.items()}
         for message, condition in part.checks:
-            text = PLACEHOLDER.sub(lambda found: f"{{{names.of(found[1])}}}", message)
-            file.checks.append((f"{prefix}: {text}", names.expression(condition)))
+            text = f"{prefix}: {names.message(message)}"
+            file.checks.append((text, names.expression(condition)))
         for table in part.tables.items():
             number = len(file.tables)
             own = re.sub(r"\W", "_", table[0])
@@ -312,6 +313,9 @@ class _Prefix:
     def of(self, name: str) -> str:
         return f"{self.prefix}.{name}"
 
+    def message(self, text: str) -> str:
+        return PLACEHOLDER.sub(lambda found: f"{{{self.of(found[1])}}}", text)
+
     def variable(self, given: Variable) -> Variable:
         new = copy(given)
         new.name, new.field = self.of(given.name), ""
@@ -331,6 +335,8 @@ class _Prefix:
             changes = getattr(given, key).items()
             setattr(new, key, {self.of(name): self.expression(e) for name, e in changes})
         new.where = [*map(self.expression, given.where)]
+        if isinstance(new, Event):
+            new.terminate = self.message(new.terminate)
         return new
 
     def expression(self, given: Expression) -> Expression:

@@ -35,6 +35,7 @@ FIXED, DISCRETE = "fixed", "discrete"  # variabilities: of parameters, and of wh
 MOST_NUMBERS = 16  # that a whole number may be, for conditions to be resolved
 MOST_OPERATIONS = 1_000_000  # of all expressions
 LONGEST_SHOWN = 60  # characters of a value in a message
+PLACEHOLDER = re.compile(r"\{((?:\w+\.)*\w+(?:\[[0-9,]+\])?)\}")  # of a value in a message
 # what other languages have, by what it looks like, and what to do instead
 INSTEAD = {
     r"^(?:equations?|residuals?|dae)$": (
@@ -178,6 +179,7 @@ class Event(Change):
     """An event of the file."""
 
     when: Expression
+    terminate: str = ""  # why it ends the simulation, if it does
 
     @property
     def conditions(self) -> list[Expression]:

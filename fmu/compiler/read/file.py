@@ -212,9 +212,7 @@ def _read_check(file: ModelFile, message: str, entry: object) -> None:
     """Read a condition, which has to hold for all values of its indexes."""
     place = ("[check]", shown(message))
     with placed(*place):
-        text = keys.plain_text(message)
-        if len(text.encode()) > keys.LONGEST_MESSAGE:
-            raise ModelFileError(f"expected a message of at most {keys.LONGEST_MESSAGE} bytes")
+        text = keys.message(message)
         given = keys.entries(entry, ("value", FOR), "value") if isinstance(entry, dict) else {}
         found = every(file, given.get(FOR))
     for indexes in found:
@@ -485,7 +483,8 @@ def _check_range(variable: Variable) -> None:
 def _read_event(file: ModelFile, element: Element) -> None:
     place, given = _change(file, "events", element, keys.EVENT)
     when = file.expression(element, (place, "when"), given["when"], CONDITION, event="when")
-    file.events.append(Event(element.name, *_given(file, element, place, given, ""), when))
+    changes = _given(file, element, place, given, "")
+    file.events.append(Event(element.name, *changes, when, given.get("terminate", "")))
 
 
 def _read_sampler(file: ModelFile, element: Element) -> None:
@@ -507,8 +506,9 @@ def _change(
         _check_name(element.name, file)
         file.happening[element.name] = section
         given = keys.entries(element.entry, known, known[0])
-        if not (given.get("set") or given.get("reinit")):
-            raise ModelFileError("expected set or reinit: what it does")
+        effects = [key for key in keys.EFFECTS if key in known]
+        if not any(map(given.get, effects)):
+            raise ModelFileError(f"expected {' or '.join(effects)}: what it does")
         return place, given
 
 

@@ -70,7 +70,8 @@ EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
 TABLE = ("x", "y", "z", "file", "interpolation", "outside")
 MEMBERS = ("signals", "inflows", "outflows")
 TERMINAL = ("rule", "description", *MEMBERS, "terminals")
-EVENT = ("when", "while", "where", "reinit", "set")
+EVENT = ("when", "while", "where", "reinit", "set", "terminate")
+EFFECTS = ("set", "reinit", "terminate")
 HOOK = ("sources", "indicators", "series", "reads", "reach")
 SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
@@ -110,6 +111,21 @@ def plain_text(value: object) -> str:
     if CONTROL.search(value):
         raise ModelFileError("has a control character")
     return " ".join(value.split())
+
+
+def message(value: object) -> str:
+    """Return the text of a message in one line."""
+    text = plain_text(value)
+    if len(text.encode()) > LONGEST_MESSAGE:
+        raise ModelFileError(f"expected a message of at most {LONGEST_MESSAGE} bytes")
+    return text
+
+
+def _end(value: object) -> str:
+    text = message(value)
+    if not text:
+        raise ValueError("expected why the simulation ends")
+    return text
 
 
 def _unit(value: object) -> str:
@@ -190,6 +206,7 @@ READ = {
     **dict.fromkeys(MEMBERS, NAMES),
     **dict.fromkeys(("follows", "indicators"), LIST),
     "description": plain_text,
+    "terminate": _end,
     "unit": _unit,
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
     **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from ..expressions.expression import in_order
 from ..graph import algebraic
 from ..graph.graph import CONDITIONS, LEAVES, Value
 from ..plain_c.values import RELATION, Conditions
+from ..read.content import PLACEHOLDER, ModelFile
 from .blocks import Blocks, Writer
-from .c_text import indented
+from .c_text import indented, text
 from .loops import printed
 from .statements import Block, Constant, Item, Operand, Place, Statement, store
 
@@ -307,3 +308,22 @@ def located(code: Code, bounds: str, x: Operand) -> Operand:
         return "relations_floor", x
     code.leaves.arrays.add(bounds)
     return "relations_locate", bounds, f"sizeof {bounds} / sizeof *{bounds}", x
+
+
+def told(
+    file: ModelFile, code: Code, given: str, known: Collection[str] | None = None
+) -> tuple[Operand, ...]:
+    """Format and arguments of a message, in which values stand in the place of {NAME}.
+
+    known: operations of the leaves that such a value may have; any if it is missing.
+    """
+    parts = PLACEHOLDER.split(given)
+    form, arguments = parts[0].replace("%", "%%"), []
+    for name, rest in zip(parts[1::2], parts[2::2], strict=True):
+        variable, shown = file.variables.get(name), f"{{{name}}}"
+        value = variable and (variable.leaf or variable.value)
+        if value and (known is None or {op for op, _ in value.leaves} <= {*known}):
+            shown, found = ("%g" if variable.is_real else "%d"), code.of(value)
+            arguments += [", ", ("+", found, 0.0) if variable.is_real else ("(int)", found)]
+        form += shown + rest.replace("%", "%%")
+    return text(form), *arguments

@@ -17,7 +17,7 @@ from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
 from ..plain_c.values import Conditions
 from ..read.content import CALCULATED, COUNTS, SWITCHES, Change, ModelFile, Sampler
-from .c_code import Code, Leaves, located
+from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
 from .statements import Block, Operand, Place, Statement, field_of, store
@@ -142,7 +142,8 @@ def _uncoupled(file: ModelFile) -> set[str]:
 def has_events(file: ModelFile) -> bool:
     """Return whether a file has anything that only events, or the initialization, may write."""
     written = file.sampled or file.of("discrete", COUNTS, SWITCHES)
-    return bool(file.graph.relations or written or _has_starts(file))
+    ends = any(event.terminate for event in file.events)
+    return bool(file.graph.relations or written or _has_starts(file) or ends)
 
 
 def _has_starts(file: ModelFile) -> bool:
@@ -250,6 +251,7 @@ class Events:
             if states
             else "0",
             circles=self._circles(),
+            **self._ends(),
             has_inputs=int(any(self.graph.is_of_inputs(r.distance) for r in self.relations)),
             modes=2
             + len(self.relations)
@@ -326,6 +328,29 @@ class Events:
             f".is_circular = (const bool[]){{{', '.join(truths)}}},",
             f".names = (const char *const[]){{{', '.join(names)}}},",
         ]
+
+    def _ends(self) -> dict[str, list[str]]:
+        """Which events end the simulation, and whether one has."""
+        ends = [bool(event.terminate) for event in self.file.events]
+        if not any(ends):
+            return dict.fromkeys(("ends", "has_ended", "end"), [])
+        lines = ["static bool has_ended(const void *values_pointer, double time, char *text,"]
+        lines += ["                      size_t size) {"]
+        lines += ["    const struct equations_values *values = values_pointer;"]
+        for i, event in enumerate(self.file.events, 1):
+            if event.terminate:
+                code = Code(self.leaves)
+                said = told(self.file, code, f"event {event.name}: {event.terminate}")
+                code.statements.append(Statement(("(void)snprintf(text, size, ", *said, ");")))
+                inner = [*code.lines(), "return true;"]
+                block = [f"if (values->active[EVENTS] == {i}) {{", *indented(inner), "}"]
+                lines += indented(block)
+        truths = ", ".join(str(of).lower() for of in ends)
+        return {
+            "ends": [f".ends = (const bool[]){{{truths}}},"],
+            "has_ended": [*lines, "    return false;", "}", ""],
+            "end": [".has_ended = has_ended,"],
+        }
 
     def _rest(self) -> dict[str, list[str]]:
         """When all states rest: where the conditions hold that make each rate 0.

@@ -1,6 +1,5 @@
 """The model in C: equations.h with its value structure, equations.c with its struct model."""
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,11 +10,11 @@ from ..graph.graph import FALLIBLE, Value, is_number
 from ..names import Field
 from ..read.content import CALCULATED, OPTIONS, ModelFile
 from . import c_algebraic, c_hook
-from .c_code import Code, of_both
+from .c_code import Code, of_both, told
 from .c_events import Events, arrays, count, leaves, ticks
 from .c_series import Series
 from .c_text import declared, filled, indented, number, shortened, text
-from .statements import Block, Operand, Place, Statement, field_of, store
+from .statements import Block, Place, Statement, field_of, store
 
 BY_AVX2 = """
 BY_AVX2 static enum status extend_by_avx2(const struct series_origin *origin, int first, int last,
@@ -375,20 +374,6 @@ def _at_start(file: ModelFile, structure: str, derivatives: Mapping[Field, Value
     return [f"if ({condition}) {{", *indented(code.lines()), "}"]
 
 
-def _message(file: ModelFile, code: Code, given: str) -> tuple[Operand, ...]:
-    """Format and arguments of a message, in which values stand in the place of {NAME}."""
-    parts = re.split(r"\{((?:\w+\.)*\w+(?:\[[0-9,]+\])?)\}", given)
-    form, arguments = parts[0].replace("%", "%%"), []
-    for name, rest in zip(parts[1::2], parts[2::2], strict=True):
-        variable, shown = file.variables.get(name), f"{{{name}}}"
-        value = variable and (variable.leaf or variable.value)
-        if value and {op for op, _ in value.leaves} <= {"parameter", "integer"}:
-            shown, found = ("%g" if variable.is_real else "%d"), code.of(value)
-            arguments += [", ", ("+", found, 0.0) if variable.is_real else ("(int)", found)]
-        form += shown + rest.replace("%", "%%")
-    return text(form), *arguments
-
-
 def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition, or leave it undefined."""
     graph, code = file.graph, Code(leaves(file))
@@ -400,7 +385,7 @@ def _checks(file: ModelFile) -> list[str]:
         holds, unknown = check.value, graph.unknown(check.value)
         if unknown is not None:
             holds = graph.value("and", graph.value("not", unknown), holds)
-        conditions.append((code.of(holds), _message(file, code, message)))
+        conditions.append((code.of(holds), told(file, code, message, {"parameter", "integer"})))
     refused = Statement(("return STATUS_INVALID_PARAMETERS;",))
     for condition, message in conditions:
         why = Statement(("(void)snprintf(text, size, ", *message, ");"))
