@@ -111,7 +111,7 @@ def _further(named: Schema) -> dict[str, Schema]:
     experiment = {key: ABOVE_0 | {"default": value} for key, value in reader.EXPERIMENT.items()}
     experiment["tolerance"] |= {"exclusiveMaximum": 1}
     mode = {"type": "string", "pattern": WITH_INDEXES, **named}
-    modes = {"anyOf": [TRUTH, _table({"start": _start(TRUTH), FOR: EXPRESSION}, "start")]}
+    modes = {"anyOf": [TRUTH, _table({"start": _start(TRUTH), FOR: EXPRESSION})]}
     unit = _table(dict.fromkeys((*BASE, ANGLE), {"type": "integer", "minimum": -99, "maximum": 99}))
     size = {"type": "integer", "minimum": 0, "maximum": reader.MOST_SIZE}
     of_functions = {"not": {"enum": sorted(reader.TAKEN)}}

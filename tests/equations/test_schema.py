@@ -31,6 +31,7 @@ from tests.support.rparm_project import Console
 FILES = {
     "model": [
         *EXAMPLES,
+        *ROOT.glob("tests/textbook/*.toml"),
         *(path for path in ROOT.glob("models/*/rp_*.toml") if "lock" not in path.name),
     ],
     "scenario": sorted(ROOT.glob("models/*/scenarios/*.toml")),

@@ -123,7 +123,7 @@ def read_tables(
             _check_name(element.name, file)
             start = element.entry
             if isinstance(start, dict):
-                start = keys.entries(start, ("start",), "start")["start"]
+                start = keys.entries(start, ("start",)).get("start", False)
             if type(start) is not bool:
                 raise ModelFileError(f"expected true or false, got {shown(start)}")
         file.modes[element.name] = start
