@@ -77,4 +77,3 @@ def _enter(chain: Sequence[Level], end: Signal, source: Signal) -> None:
         source = "", entering
     last = chain[-1]
     last.connections[*source, last.own(end[0]), end[1]] = None
-
