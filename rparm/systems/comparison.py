@@ -25,6 +25,7 @@ from rparm.systems.master import master_of, run_in_master
 from rparm.systems.structure import WAYS, Component, Connector, OpenedSystem
 
 WHOLE = "whole"  # the name of a system as one component
+ROUNDING = 1e-9  # of an error that no order improves
 PARTS = 32  # of a step, over which the whole system holds an input
 BOUND = 1e-7  # on the relative error of every variable
 
@@ -125,7 +126,8 @@ def _cheaper(
             values = run_in_master(other, variant, names, progress).values
             errors[order] = float((np.abs(values - limit).max(axis=0) / sizes).max())
     best = min(sorted(errors), key=errors.__getitem__, default="")
-    return (best, errors[best]) if best and errors[best] <= error / 2 else None
+    halves = best and error > ROUNDING and errors[best] <= error / 2
+    return (best, errors[best]) if halves else None
 
 
 def with_exact(outcome: Outcome, ssp: OpenedSystem, names: Sequence[str]) -> Outcome:
