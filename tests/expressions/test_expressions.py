@@ -1,7 +1,9 @@
 """Expressions: against Python's own arithmetic, and what is refused."""
 
+import decimal
 import math
 import random
+from fractions import Fraction
 
 import pytest
 from rparm.fmu_tools.compiler import units
@@ -134,6 +136,8 @@ UNITS = {
         ("2**phi", "1"),
         ("1 / (m * time)", "1/(kg.s)"),
         ("l**0.5 * sqrt(l)", "m"),
+        ("sqrt(m) * l**1.5 / sqrt(time)", "kg0.5.m1.5/s0.5"),
+        ("omega * sqrt(1[V/Hz0.5] / 1[V]) * time**0.75", "1"),
         ("sin(2[rad/s] * time) * 3[mm]", "m"),
         ("tanh(omega / 0.5[rpm])", "1"),
         ("mod(time, 86400)", "s"),
@@ -209,8 +213,28 @@ def test_a_unit_is_a_product_of_symbols() -> None:
     assert units.parsed("N.m.s/rad").exponents == {"kg": 1, "m": 2, "s": -1, "rad": -1}
     assert units.parsed("V/(A.s)").exponents == {"kg": 1, "m": 2, "s": -4, "A": -2}
     assert units.parsed("1").exponents == {}
-    for text in ("", "kg m", "m/s/s", "x", "m^2", "2", "1.m", "(m)", "m10"):
+    for text in ("", "kg m", "m/s/s", "x", "m^2", "2", "1.m", "(m)", "m10", "m0", "m0.0", "m.5"):
         with pytest.raises(ValueError):
+            units.parsed(text)
+
+
+def test_exponents_may_be_halves() -> None:
+    """Their factors are the nearest doubles: exact where they are a fraction."""
+    kv = units.parsed("m3/(s.kPa0.5)")
+    assert kv.exponents == {"m": 3.5, "kg": -0.5} and kv.base == "m3/(s.Pa0.5)"
+    assert units.parsed("V/Hz0.5").exponents == {"kg": 1, "m": 2, "s": -2.5, "A": -1}
+    assert units.parsed("cm0.5.m-0.5").factor == units.parsed("dm.m-1").factor
+    with decimal.localcontext(prec=60):
+        for text, square in (("kPa0.5", "1e3"), ("mm2.5", "1e-15"), ("1/bar1.5", "1e-15")):
+            root = decimal.Decimal(square).sqrt()
+            for number in ("1", "5", "0.3", "1e300", "7.123456789012345e-9"):
+                assert units.parsed(text).value(number) == float(decimal.Decimal(number) * root)
+    chance = random.Random(3)
+    for _ in range(200):
+        half = {base: Fraction(chance.choice([*range(-9, 0), *range(1, 10)]), 2) for base in "msA"}
+        assert units.parsed(units.shown(half)).exponents == half
+    for text in ("m0.3", "m1.50", "V/sqrt(Hz)", "V/Hz1/2", "m.5"):
+        with pytest.raises(ValueError, match=r"^unit .* whole or halves, as in Hz0.5, up to 9.5"):
             units.parsed(text)
 
 

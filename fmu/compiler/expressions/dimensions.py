@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from .. import units as si
-from ..units import BASE
+from ..units import BASE, Exponents
 from .expression import EQUALITIES, RELATIONS, ExpressionError, Node, in_order
 from .parser import AS_SECOND, table_unit
 
@@ -18,7 +18,7 @@ LARGEST_ROOT = 100  # 0.3333333333333333 is 1/3
 ONE: Dimension = (Fraction(0),) * len(BASE)
 
 
-def of_exponents(exponents: Mapping[str, int]) -> Dimension:
+def of_exponents(exponents: Exponents) -> Dimension:
     """Return the dimension with these exponents, by base unit."""
     return tuple(Fraction(exponents.get(base, 0)) for base in BASE)
 

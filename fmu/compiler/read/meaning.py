@@ -16,7 +16,7 @@ from ..expressions.expression import (
 from ..expressions.hints import meant
 from ..expressions.indexes import with_elements
 from ..expressions.kinds import CONDITION, kind_of, with_kinds
-from ..units import BASE
+from ..units import BASE, Exponents, whole
 from .blocks import block, groups
 from .content import (
     ALGEBRAIC,
@@ -244,7 +244,7 @@ def _check_units(file: ModelFile) -> None:
         if variable.expression.is_checked:
             continue
         with placed("[where]", variable.name):
-            variable.exponents = _whole(units[variable.name] or dimensions.ONE)
+            variable.exponents = _exponents(units[variable.name] or dimensions.ONE)
 
 
 def _add_units(file: ModelFile, block: Block, units: dict[str, Dimension | None]) -> None:
@@ -257,10 +257,8 @@ def _add_units(file: ModelFile, block: Block, units: dict[str, Dimension | None]
             units[name] = dimension_of(expression.tree, units)
 
 
-def _whole(unit: Dimension) -> dict[str, int]:
-    if any(exponent.denominator > 1 for exponent in unit):
-        shown_unit = dimensions.shown(unit)
-        raise ModelFileError(
-            f"has unit {shown_unit}, whose exponents are no whole numbers: use its square"
-        )
-    return {base: int(exponent) for base, exponent in zip(BASE, unit, strict=True)}
+def _exponents(unit: Dimension) -> Exponents:
+    if any(exponent.denominator > 2 for exponent in unit):
+        text = f"has unit {dimensions.shown(unit)}, whose exponents are neither whole nor halves"
+        raise ModelFileError(f"{text}: use a power of it")
+    return {base: whole(exponent) for base, exponent in zip(BASE, unit, strict=True)}
