@@ -7,7 +7,13 @@ from fractions import Fraction
 
 import pytest
 from rparm.fmu_tools.compiler import units
-from rparm.fmu_tools.compiler.expressions.dimensions import ONE, dimension_of, of_exponents, shown
+from rparm.fmu_tools.compiler.expressions.dimensions import (
+    ANY,
+    ONE,
+    dimension_of,
+    of_exponents,
+    shown,
+)
 from rparm.fmu_tools.compiler.expressions.expression import (
     FUNCTIONS,
     ExpressionError,
@@ -143,6 +149,7 @@ UNITS = {
         ("mod(time, 86400)", "s"),
         ("mod(time, -24 * 3600)", "s"),
         ("mod(l, 20[cm])", "m"),
+        ("l**2[1] + l**-2[1] * l**4", "m2"),
     ],
 )
 def test_units(text: str, unit: str) -> None:
@@ -166,6 +173,43 @@ def test_units(text: str, unit: str) -> None:
 def test_units_that_do_not_fit(text: str, column: int) -> None:
     with pytest.raises(ExpressionError, match=f"^column {column}: "):
         dimension_of(parse(f"{text}"), UNITS, expected=UNITS["time"])
+
+
+@pytest.mark.parametrize(
+    ("text", "fits"),
+    [
+        ("2[kg] + 1[mm]", False), ("x + 2[kg] + 1[mm]", False), ("x * 2[kg] + 1[mm]", True),
+        ("2[kg] if x > 0 else 1[m]", False), ("min(x, 2[kg], y) < 3[s]", False),
+        ("sin(2[rad/s] * time) + x**2[m] + 1[J]", True), ("sin(2[m]) + x", False),
+        ("sqrt(x) + 2[kg] - time", True), ("pi * 2[kg] + 1[m]", False),
+    ],
+)  # fmt: skip
+def test_numbers_fit_each_other_among_names_of_any_unit(text: str, fits: bool) -> None:
+    units = dict.fromkeys(("x", "y", "time"), ANY)
+    if fits:
+        dimension_of(parse(text), units)
+    else:
+        with pytest.raises(ExpressionError):
+            dimension_of(parse(text), units)
+
+
+def test_a_wrong_form_is_answered_by_the_right_one() -> None:
+    for text in ("any(x > 3)", "any(i = 1..3)", "any(x[i] > 3, i = 1..3)", "any(i in 1..3, x > 1)"):
+        with pytest.raises(
+            ExpressionError, match=r": over a range it is any\(i = 1..n, x\[i] > 0\)$"
+        ):
+            parse(text)
+    for text in ("min(x)", "min(i = 1..3)", "min(x[i], i = 1..3)", "min(1..3, x[i])"):
+        with pytest.raises(ExpressionError, match=r": over a range it is min\(i = 1..n, x\[i]\)$"):
+            parse(text)
+    for text in ("2[rad]s", "2[rad] x", "2[m][s]", "2[rad](x)"):
+        with pytest.raises(ExpressionError, match="behind a unit: write all of the unit between"):
+            parse(text)
+    for text in ("sin(x)[rad]", "(x)[m]"):
+        with pytest.raises(
+            ExpressionError, match=r"'\[': only numbers have units, as in 2\[rad/s]"
+        ):
+            parse(text)
 
 
 def test_indexes_keep_units() -> None:

@@ -270,7 +270,10 @@ class ModelFile:
             always = [tree]  # calculated in any case; a branch need not have a value
             for node in always:
                 always += node.arguments[:1] if node.op == "if" else node.arguments
-                if node.op == "/" and (by := node.arguments[1]).op == "number" and by.value == 0:
+                by = node.arguments[1] if node.op == "/" else node
+                while by.op in ("unit", "negative"):
+                    by = by.arguments[0]
+                if node.op == "/" and by.op == "number" and by.value == 0:
                     at = ", ".join(f"{i} = {value}" for i, value in element.indexes.items())
                     raise ExpressionError(node.column, f"division by 0{at and f' at {at}'}")
             if self.operations > MOST_OPERATIONS:
