@@ -197,6 +197,22 @@ def test_numbers_of_other_units_are_declared_in_si() -> None:
 
 
 @pytest.mark.parametrize("version", ["", "fmi3"])
+@EACH_METHOD
+def test_right_sides_of_a_whole_array_see_the_values_before(method: int, version: str) -> None:
+    """A line of exponentials, which a sampler shifts by one; a matrix that an event turns."""
+    fmu = made(TEXTS["LINE"])
+    start = {"solver_method": method}
+    run = simulated(fmu.parent / version / fmu.name, 3.0, 0.1, start, relative_tolerance=1e-10)
+    rates, expected = -np.arange(6) / 10, np.arange(6.0) * np.exp(-np.arange(6) / 20)
+    for span in (1.0, 1.0, 0.5):
+        expected = np.roll(expected, 1) * np.exp(rates * span)
+    assert [run[f"x[{i}]"][-1] for i in range(6)] == pytest.approx(expected, rel=1e-8)
+    z = np.array([[run[f"z[{i},{j}]"] for j in (1, 2, 3)] for i in (1, 2)])
+    assert np.array_equal(z[..., 0], [[1, 2, 3], [4, 5, 6]])
+    assert np.array_equal(z[..., -1], [[6, 5, 4], [3, 2, 1]])
+
+
+@pytest.mark.parametrize("version", ["", "fmi3"])
 def test_a_unit_with_halves_has_no_base_unit(version: str) -> None:
     """FMI has no fraction there. What users write is converted as any other unit."""
     fmu = made(TEXTS["VALVE"])
