@@ -198,7 +198,7 @@ class SystemBase(Base):
             self._hashes[name] = _sha256(read)
             self.archives[self._hashes[name]] = content
         system = self._system
-        if master.is_needed(system, opened.models):
+        if master.beyond_steps(system, opened.models):
             self.wiring = Wiring(system.connections, system.order, dict(system.rates))
         moved = system.inputs
         self._fed = {*(c.end for c in self._system.connections), *moved}

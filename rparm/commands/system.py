@@ -103,6 +103,10 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
         if options.exact and (system.folder or system.ssp.path.suffix.lower() != ".toml"):
             what = "a loop file whose components are all files with equations"
             raise UserError(f"{system.ssp.path}: --exact expects {what}")
+        for name in system.ssp.system.rates if options.exact else ():
+            raise UserError(
+                f"{system.ssp.path}: --exact: {name} has its own rate, one FMU has none"
+            )
         if system.folder and system.study:
             given = system.folder, system.study.EXPERIMENT
             references = {n: comparison.load_reference(system.ssp, n, *given) for n in names}

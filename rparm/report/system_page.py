@@ -23,7 +23,7 @@ from rparm.report.scenario_page import cells, meanings
 from rparm.runs.inputs import Log
 from rparm.systems import comparison, ecos
 from rparm.systems.comparison import BOUND, Diagram, Measure, Outcome, Study, load_study
-from rparm.systems.feedthrough import loops, sequence
+from rparm.systems.feedthrough import on_loops, sequence
 from rparm.systems.structure import OpenedSystem
 from rparm.units import duration, exponents, seconds, short, unit
 
@@ -357,12 +357,10 @@ def _coupled(ssp: OpenedSystem) -> Iterator[str]:
     rates = [f"{name} every {duration(every)}" for name, every in system.rates.items()]
     if rates:
         yield f"Rates: {', '.join(rates)}."
-    real = [c for c in system.connections if ssp.variable(c.start).type == "Real"]
-    for loop in loops(real, ssp.models):
+    if solved := sorted(on_loops(system.connections, ssp.models)):
         yield (
             f"Solved together at each communication point, by Newton's method from the values "
-            f"before: {', '.join(c.end for c in loop)}. Of several solutions it is the one that "
-            "this leads to."
+            f"before: {', '.join(solved)}. Of several solutions it is the one that this leads to."
         )
 
 

@@ -5,6 +5,8 @@ are the FMUs' directional ones (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.11)
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
+from typing import NoReturn
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -15,9 +17,10 @@ from rparm.systems.connected_instance import ConnectedInstance
 from rparm.units import short
 
 ROUNDING = 4 * np.finfo(float).eps  # of the terms: u and y are equal
-STALLED = 1e-10  # of the terms: good enough where no step comes closer
-HIDDEN = 1e-12  # of the nominal value, likewise: rounding of terms that nobody sees
-DIFFERENCE = 1e-7  # of an input, for difference quotients
+# where no step comes closer, of the terms and of the nominal value: rounding within the FMUs
+STALLED, HIDDEN = 1e-10, 1e-12
+MOST_INVERSE = 1e5  # then, of 1 - y'(u) divided by its terms: no touch of both sides
+DIFFERENCE = 1e-7  # of the largest value of an input, for difference quotients
 MOST_STEPS, MOST_HALVES = 50, 30
 
 
@@ -33,6 +36,7 @@ class AlgebraicLoop:
             component.on_loop[i] = True
         variables = [c.instance.fmu.model.variables[c.inputs.names[i]] for c, i in ends]
         self.nominals = np.array([variable.nominal or 1.0 for variable in variables])
+        self.largest = np.zeros(len(ends))  # of each input so far
         self.solved: np.ndarray | None = None  # inputs and what feeds them, as solved last
 
     def solve(self, values: np.ndarray, now: Sequence[ConnectedInstance], when: str) -> None:
@@ -70,6 +74,8 @@ class _Search:
         if others:
             apart = self._apart(u)
         u = self._searched(u, apart)
+        largest = self._loop.largest
+        largest[self._rows] = np.maximum(largest[self._rows], np.abs(u))
         self._loop.solved = self._state(u)
 
     def _state(self, u: np.ndarray) -> np.ndarray:
@@ -77,26 +83,43 @@ class _Search:
 
     def _searched(self, u: np.ndarray, apart: np.ndarray) -> np.ndarray:
         """Return the solution, at which the FMUs are; UserError if none is found."""
-        for _ in range(MOST_STEPS):
-            if not self._is_off(u, apart, ROUNDING):
+        sizes = np.where(self._loop.largest > 0, self._loop.largest, self._loop.nominals)
+        for changed in (sizes[self._rows], self._nominals):
+            self._sizes = changed
+            for _ in range(MOST_STEPS):
+                if not self._is_off(u, apart, ROUNDING):
+                    return u
+                self._read_slopes(u)
+                closer = self._step(u, apart)
+                if closer is None:
+                    break
+                u, apart = closer
+            apart = self._apart(u)
+            if self._is_near(u, apart):
                 return u
-            self._read_slopes(u)
-            closer = self._step(u, apart)
-            if closer is None:
-                break
-            u, apart = closer
-        apart = self._apart(u)
-        if self._is_off(u, apart, STALLED, HIDDEN):
-            self._fail(u, apart)
-        return u
+        self._fail(u, apart)
+
+    def _is_near(self, u: np.ndarray, apart: np.ndarray) -> bool:
+        """Whether only rounding within the FMUs may keep y(u) from u."""
+        terms = self._terms(u, apart)
+        scaled = self._slopes * terms / terms[:, None]
+        if not np.isfinite(scaled).all() or self._is_off(u, apart, STALLED, HIDDEN):
+            return False
+        try:
+            inverse = np.linalg.inv(np.eye(len(u)) - scaled)
+        except np.linalg.LinAlgError:
+            return False
+        sizes = np.abs(inverse) @ (1 + np.abs(scaled).sum(axis=1))
+        return bool((sizes < MOST_INVERSE).all())
 
     def _step(self, u: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Step as far as it comes closer; None if it never does."""
-        matrix = np.eye(len(u)) - self._slopes
         terms = self._terms(u, apart)
         try:
-            step = np.linalg.solve(matrix, apart)
+            step = np.linalg.solve(np.eye(len(u)) - self._slopes, apart)
         except np.linalg.LinAlgError:
+            return None
+        if not np.isfinite(step).all():
             return None
         before = np.abs(apart / terms).max()
         for _ in range(MOST_HALVES):
@@ -144,31 +167,32 @@ class _Search:
                 for k, source in enumerate(self._sources)
                 if component.first <= source < component.end
             ]
-            model = component.instance.fmu.model
-            if model.gives_directional_derivatives:
+            if component.instance.fmu.model.gives_directional_derivatives:
                 knowns = [component.inputs.names[self._ends[k][1]] for k in own]
-                unknowns = [
-                    component.outputs.names[self._sources[k] - component.first] for k in fed
-                ]
-                found = component.instance.partials(unknowns, knowns)
-                self._slopes[np.ix_(fed, own)] = found
-            else:
-                for k in own:
-                    self._difference(component, k, fed, u)
+                sources = [self._sources[k] - component.first for k in fed]
+                unknowns = [component.outputs.names[source] for source in sources]
+                with suppress(UserError):  # it may have none here
+                    found = component.instance.partials(unknowns, knowns)
+                    self._slopes[np.ix_(fed, own)] = found
+                    continue
+            for k in own:
+                self._slopes[fed, k] = self._difference(k, u)[fed]
 
-    def _difference(
-        self, component: ConnectedInstance, k: int, fed: Sequence[int], u: np.ndarray
-    ) -> None:
-        moved = u.copy()
-        moved[k] += DIFFERENCE * (abs(u[k]) or self._nominals[k])
-        here = self._values[self._sources]
-        there = self._apart(moved) + moved
-        self._slopes[fed, k] = (there - here)[fed] / (moved[k] - u[k])
+    def _difference(self, k: int, u: np.ndarray) -> np.ndarray:
+        """Return the difference quotient of what feeds the loop by one input, (n,)."""
+        here, moved = self._values[self._sources], u.copy()
+        change = DIFFERENCE * max(abs(u[k]), self._sizes[k])
+        for value in (u[k] + change, u[k] - change):
+            moved[k] = value
+            there = self._apart(moved) + moved
+            if np.isfinite(there).all():
+                break
         self._apart(u)
+        return (there - here) / (moved[k] - u[k])
 
-    def _fail(self, u: np.ndarray, apart: np.ndarray) -> None:
+    def _fail(self, u: np.ndarray, apart: np.ndarray) -> NoReturn:
         worst = int(np.argmax(np.abs(apart) / self._terms(u, apart)))
-        by = short(float(apart[worst]))
+        by = short(abs(float(apart[worst])))
         size = counted(self._names, "connection")
         raise UserError(
             f"no solution of the algebraic loop of {size} found {self._when}: "

@@ -37,7 +37,7 @@ class ConnectedInstance:
         every: float | None,
     ) -> None:
         self.instance, self.every = instance, every
-        self.time, self.ticks = 0.0, 0  # of its last communication point, s, and their number
+        self.time, self.ticks = 0.0, 0.0  # of its last communication point, s, and their number
         self.sources = np.array(sources, dtype=int)
         self.ahead = np.array(ahead, dtype=bool)
         self.first, self.end = first, first + len(outputs)  # among the values
@@ -56,7 +56,9 @@ class ConnectedInstance:
             for i, name in enumerate(outputs)
             if name in feeding and model.variables[name].variability != "discrete"
         ]
-        moving = [] if is_python(instance.fmu.path.name) else moving
+        self._is_sampled = bool(feeding) and not moving
+        if is_python(instance.fmu.path.name):
+            moving, self._is_sampled = [], True
         given = model.gives_output_derivatives
         known = [i for i in moving if given and outputs[i] not in solved]
         self._output_slopes = instance.output_derivatives([outputs[i] for i in known], 1)
@@ -69,12 +71,13 @@ class ConnectedInstance:
         return self.instance.name
 
     def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
-        for name in self.inputs.names:
-            if name in parameters:
-                raise UserError(f"{self.name}.{name}: is connected and cannot be set")
-        self.start = self.time = start
+        """Initialize it; inputs on algebraic loops have first guesses among the parameters."""
         variables = self.instance.fmu.model.variables
-        self.inputs.view[:] = [variables[name].start or 0.0 for name in self.inputs.names]
+        for i, name in enumerate(self.inputs.names):
+            if name in parameters and not self.on_loop[i]:
+                raise UserError(f"{self.name}.{name}: is connected and cannot be set")
+            self.inputs.view[i] = parameters.get(name, variables[name].start or 0.0)
+        self.start = self.time = start
         begin_instance(self.instance, start, stop, parameters)
 
     # ---- Its rate --------------------------------------------------------------------------------
@@ -84,7 +87,7 @@ class ConnectedInstance:
 
         The end is the system's point nearest to a multiple of `every`, the earlier of two.
         """
-        if self.every is None:
+        if self.every is None or self.every <= length:
             return True
         due = self.start + (self.ticks + 1) * self.every - length / 2
         return due <= end + ROUNDING * length
@@ -92,8 +95,9 @@ class ConnectedInstance:
     def ended(self, end: float, length: float) -> None:
         """Note that its step has ended with the system's step of this length."""
         self.time = end
-        while self.every is not None and self.is_due(end, length):
-            self.ticks += 1
+        if self.every is not None:
+            passed = (end - self.start + (0.5 + ROUNDING) * length) / self.every
+            self.ticks = max(self.ticks, np.floor(passed))
 
     # ---- Values ----------------------------------------------------------------------------------
 
@@ -111,11 +115,21 @@ class ConnectedInstance:
         self.inputs.view[:] = values
         self.inputs.set()
 
+    def follow(self, values: np.ndarray) -> None:
+        """Set the inputs to the system's values, those on algebraic loops as they are solved for.
+
+        Their sources are equal but for rounding, which the gain of a loop would amplify.
+        """
+        self.set_inputs(np.where(self.on_loop, self.inputs.view, values[self.sources]))
+
     def set_lines(self, length: float) -> None:
-        """Set the inputs over a step as the lines that are kept, or the mean of each."""
+        """Set the inputs over a step as the lines that are kept.
+
+        An FMU that takes no slopes gets the mean of each, or the beginning if it is sampled.
+        """
         values, slopes = self.kept
         if self._lines is None:
-            self.set_inputs(values + length / 2 * slopes)
+            self.set_inputs(values if self._is_sampled else values + length / 2 * slopes)
             return
         self.inputs.view[:] = values
         self._lines.view[:] = self.kept

@@ -52,6 +52,16 @@ def loops(
     return sorted(map(tuple, found.values()), key=lambda loop: len(reached[loop[0].end]))
 
 
+def on_loops(connections: Iterable[Connection], models: Mapping[str, Model]) -> set[str]:
+    """Return the Real inputs on algebraic loops, which are solved for."""
+    reals = [
+        c
+        for c in connections
+        if (v := models[c.start_component].variables.get(c.start_connector)) and v.type == "Real"
+    ]
+    return {c.end for loop in loops(reals, models) for c in loop}
+
+
 def _behind(name: str, causes: Mapping[str, Iterable[str]]) -> set[str]:
     """Return all that a name follows at once, itself only if it is in a circle."""
     found: set[str] = set()

@@ -27,6 +27,7 @@ from rparm.fmi.model import INPUTS, PARAMETERS, Model, Variable
 from rparm.interruption import temporary_folder
 from rparm.project import VERSIONS
 from rparm.runs.inputs import Constant, InputReader, Switches
+from rparm.systems.feedthrough import on_loops
 from rparm.systems.python_component import SUFFIX, PythonComponent, split
 from rparm.systems.sections import (
     CONNECTIONS,
@@ -39,7 +40,6 @@ from rparm.systems.sections import (
 )
 from rparm.systems.structure import (
     ALONE,
-    WAYS,
     Component,
     Connection,
     Connector,
@@ -90,9 +90,11 @@ class LoopReader(Sections):
     def system(self, content: dict[str, Any], step: float | None) -> OpenedSystem:
         given = self.flat(content)
         name = self.name(content["name"], "name")
-        order = content.get("order", "jacobi")
-        if not isinstance(order, str) or order not in WAYS:
-            self.fail(f"order: expected one of {', '.join(WAYS)}, got {show(order)}")
+        order = self.order(content)
+        others = [name for name, own in given.orders.items() if own != order]
+        if others:
+            kept = f"its file's order does not apply, {order} does"
+            self.notes.append(f"subsystem {', '.join(others)}: {kept}")
         description = (
             self.text(content["description"], "description") if "description" in content else ""
         )
@@ -122,6 +124,7 @@ class LoopReader(Sections):
         return OpenedSystem(
             self.path, self.folder, system, self.models, files=self.files, python=self.python,
             version=self.version, read=self.read,
+            solved=on_loops(system.connections, self.models),
         )  # fmt: skip
 
     # ---- Names -----------------------------------------------------------------------------------
@@ -282,9 +285,10 @@ class LoopReader(Sections):
         """Add inputs from outside; constants are parameters of all variants that give no other."""
         known: dict[str, Variable] = {}
         fed = {c.end: c.start for c in system.connections}
+        solved = on_loops(system.connections, self.models)
         for values in system.parameters.values():
             for name in (f"{component}.{x}" for component in values for x in values[component]):
-                if name in fed:
+                if name in fed and name not in solved:
                     self.fail(f"{name}: is connected to {fed[name]} and cannot be set")
         for name in given:
             component, variable = self.variable(name, f"[{INPUTS}]")

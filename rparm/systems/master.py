@@ -39,7 +39,7 @@ from rparm.runs.inputs import Signal
 from rparm.systems.algebraic_loop import AlgebraicLoop
 from rparm.systems.connected_instance import ConnectedInstance, check_finite
 from rparm.systems.ecos import Run, said_at_end
-from rparm.systems.feedthrough import loops, sequence
+from rparm.systems.feedthrough import loops, on_loops, sequence
 from rparm.systems.python_component import is_python
 from rparm.systems.structure import WAYS, Connection, OpenedSystem, System, split
 
@@ -268,7 +268,10 @@ class Master(AbstractContextManager["Master"]):
                     with component.instance.explained(when):
                         component.set_inputs(self.values[component.sources])
         names = ", ".join([*(self.names[i] for i in changing), *switched])
-        raise UserError(f"the connections form an algebraic loop: {names}")
+        if switched:
+            way_out = "a loop through Booleans or Integers has to settle by itself"
+            raise UserError(f"{names}: no end of changes {when}: {way_out}")
+        raise UserError(f"the connections form an algebraic loop {when}: {names}")
 
     def _solve(self, components: Sequence[ConnectedInstance], when: str) -> None:
         """Solve the algebraic loops of components at this time."""
@@ -464,14 +467,15 @@ def ways(models: Mapping[str, Model], connections: Iterable[Connection]) -> list
     return [(order, inputs) for inputs in INPUT_MODES[: 1 + can] for order in ORDERS]
 
 
-def is_needed(system: System, models: Mapping[str, Model]) -> bool:
-    """Whether a system has more than steps side by side: an order, rates, algebraic loops."""
-    reals = [
-        c
-        for c in system.connections
-        if models[c.start_component].variables[c.start_connector].type == "Real"
-    ]
-    return bool(system.order != "jacobi" or system.rates or loops(reals, models))
+def beyond_steps(system: System, models: Mapping[str, Model]) -> str:
+    """Say what a system has more than steps side by side, or nothing."""
+    if system.order != "jacobi":
+        return f"its order is {system.order}"
+    for name in system.rates:
+        return f"{name} has its own rate"
+    for name in sorted(on_loops(system.connections, models)):
+        return f"{name} is on an algebraic loop"
+    return ""
 
 
 # ---- Of a file -----------------------------------------------------------------------------------
@@ -520,7 +524,7 @@ def run_in_master(
                         continue
                     with component.instance.explained(f"at t = {end!r} s"):
                         if sets:
-                            component.set_inputs(master.values[component.sources])
+                            component.follow(master.values)
                         reader.read(rows[row])
             except UserError as error:
                 if row > 1:

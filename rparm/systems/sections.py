@@ -24,6 +24,7 @@ from rparm.files import (
 )
 from rparm.fmi.model import INPUTS, PARAMETERS
 from rparm.runs.inputs import Reader
+from rparm.systems.structure import WAYS
 from rparm.units import SECONDS
 
 COMPONENTS, CONNECTIONS, VARIANTS, KEEP = "components", "connections", "variants", "keep"
@@ -50,6 +51,7 @@ class Flat:
 
     components: dict[str, Given] = field(default_factory=dict)
     subsystems: list[str] = field(default_factory=list)  # names, each before those in it
+    orders: dict[str, str] = field(default_factory=dict)  # that their files give
     connections: dict[str, Any] = field(default_factory=dict)
     inputs: dict[str, Any] = field(default_factory=dict)
     parameters: dict[str, Any] = field(default_factory=dict)
@@ -73,22 +75,38 @@ class Sections(Reader):
         components = self.table(content[COMPONENTS], f"[{COMPONENTS}]")
         if not components:
             self.fail(f"[{COMPONENTS}]: expected a component")
-        found = Flat()
+        self.order(content)
+        inner, own = Flat(), Flat()
         for name, given in components.items():
             self.name(name, f"[{COMPONENTS}]")
-            self._component(name, given, content.get("order"), found)
-        for section in (CONNECTIONS, INPUTS):
-            own = self.entries(content, section)
-            if section == CONNECTIONS:  # in place of the signal of a subsystem
-                found.inputs = {k: x for k, x in found.inputs.items() if k not in own}
-                twice = next((end for end in own if end in found.connections), None)
-                if twice:
-                    self.fail(f"[{section}] {twice}: its subsystem has connected it already")
-            getattr(found, section).update(own)
-        found.parameters |= self.given_values(content, PARAMETERS, f"[{PARAMETERS}]")
-        return found
+            self._component(name, given, inner, own)
+        own.connections = self.entries(content, CONNECTIONS)
+        own.inputs = self.entries(content, INPUTS)
+        own.parameters |= self.given_values(content, PARAMETERS, f"[{PARAMETERS}]")
+        if twice := [end for end in own.connections if end in inner.connections]:
+            self.fail(f"[{CONNECTIONS}] {twice[0]}: its subsystem has connected it already")
+        # this file's are in place of those of subsystems
+        given = {*own.connections, *own.inputs, *own.parameters}
+        for values in (inner.inputs, inner.parameters):
+            for name in given & values.keys():
+                del values[name]
+        return Flat(
+            components=own.components,
+            subsystems=inner.subsystems,
+            orders=inner.orders,
+            connections=inner.connections | own.connections,
+            inputs=inner.inputs | own.inputs,
+            parameters=inner.parameters | own.parameters,
+        )
 
-    def _component(self, name: str, given: Any, order: Any, found: Flat) -> None:
+    def order(self, content: Mapping[str, Any]) -> str:
+        order = content.get("order", "jacobi")
+        if not isinstance(order, str) or order not in WAYS:
+            self.fail(f"order: expected one of {', '.join(WAYS)}, got {show(order)}")
+        return order
+
+    def _component(self, name: str, given: Any, inner: Flat, found: Flat) -> None:
+        """Take a component; what its file connects and sets, if it is a subsystem, as `inner`."""
         where = f"[{COMPONENTS}] {name}"
         table = given if isinstance(given, dict) else {FILE: given}
         self.keys(table, where, (FILE,), OF_COMPONENT)
@@ -99,41 +117,43 @@ class Sections(Reader):
                 self.fail(f"{where}: every: expected more than 0 s, got {show(table['every'])}")
         path = self.path.parent / source
         is_loop = path.suffix.lower() == EQUATIONS and is_file(path)
-        inner = read_toml(path) if is_loop else {}
-        if project.is_system(inner):
-            self._subsystem(name, path, inner, every, order, found)
+        content = read_toml(path) if is_loop else {}
+        if project.is_system(content):
+            self._subsystem(name, path, content, every, inner, found)
         else:
             found.components[name] = Given(source, self.path.parent, where, every)
         values = self.entries({PARAMETERS: table.get(PARAMETERS, {})}, PARAMETERS)
+        if FILE in values:
+            self.fail(f"{where}: parameters: {FILE} belongs into [{PARAMETERS}]")
         found.parameters |= {f"{name}.{variable}": value for variable, value in values.items()}
 
     def _subsystem(
-        self, name: str, path: Path, content: dict[str, Any], every: float | None, order: Any,
+        self, name: str, path: Path, content: dict[str, Any], every: float | None, inner: Flat,
         found: Flat,
     ) -> None:  # fmt: skip
         where = f"[{COMPONENTS}] {name}"
         if path.resolve() in self.above:
             self.fail(f"{where}: {path.name} contains itself")
         reader = Sections(path, self.above)
-        inner = reader.flat(content)
+        own = reader.flat(content)
         self.read += [path, *reader.read]
-        self.notes += reader.notes
-        if "order" in content and content["order"] != (order or "jacobi"):
-            self.notes.append(f"{where}: the order of {path.name} does not apply, this file's does")
-        for own, given in inner.components.items():
+        inner.subsystems += [name, *(f"{name}.{deeper}" for deeper in own.subsystems)]
+        inner.orders |= {f"{name}.{deeper}": order for deeper, order in own.orders.items()}
+        if "order" in content:
+            inner.orders[name] = content["order"]
+        for component, given in own.components.items():
             rate = every if given.every is None else given.every
             place = f"{where}: {path.name}: {given.where}"
-            found.components[f"{name}.{own}"] = Given(given.source, given.folder, place, rate)
-        for end, start in inner.connections.items():
+            found.components[f"{name}.{component}"] = Given(given.source, given.folder, place, rate)
+        for end, start in own.connections.items():
             fed_by = f"{name}.{start}" if isinstance(start, str) else start
-            found.connections[f"{name}.{end}"] = fed_by
-        found.subsystems += [name, *(f"{name}.{own}" for own in inner.subsystems)]
+            inner.connections[f"{name}.{end}"] = fed_by
         beside = os.path.relpath(path.parent, self.path.parent)
-        for end, signal in inner.inputs.items():
+        for end, signal in own.inputs.items():
             if isinstance(signal, dict) and isinstance(signal.get(FILE), str):
                 signal = signal | {FILE: f"{beside}/{signal[FILE]}"}
-            found.inputs[f"{name}.{end}"] = signal
-        found.parameters |= {f"{name}.{key}": value for key, value in inner.parameters.items()}
+            inner.inputs[f"{name}.{end}"] = signal
+        inner.parameters |= {f"{name}.{key}": value for key, value in own.parameters.items()}
 
     # ---- Names and values ------------------------------------------------------------------------
 
@@ -192,6 +212,12 @@ class Sections(Reader):
             component = max(known, key=len)
         elif any(name.startswith(f"{component}.") for name in components):
             component = given.rpartition(".")[0]
+            inside = [name for name in components if name.startswith(f"{component}.")]
+            if inside:
+                known = ", ".join(inside)
+                self.fail(
+                    f"{where}: {component!r} is a subsystem: name a component in it ({known})"
+                )
         if component not in components:
             self.fail(f"{where}: no component {component!r}{hint(component, components)}")
         return component, given[len(component) + 1 :]

@@ -25,6 +25,7 @@ from rparm.files import is_file
 from rparm.fmi.fmu_file import read_xml, unpack, wrong_name
 from rparm.fmi.model import Model, Value
 from rparm.interruption import temporary_folder
+from rparm.systems.feedthrough import on_loops
 from rparm.systems.structure import (
     ALONE,
     WAYS,
@@ -78,7 +79,10 @@ def unpacked(path: Path, step: float | None = None) -> Iterator[OpenedSystem]:
         reader = SspReader(path, folder)
         system = reader.system(step)
         check(path, system, reader.models)
-        yield OpenedSystem(path, folder, system, reader.models, is_plain=reader.is_plain)
+        solved = on_loops(system.connections, reader.models)
+        yield OpenedSystem(
+            path, folder, system, reader.models, is_plain=reader.is_plain, solved=solved
+        )  # fmt: skip
 
 
 # ---- Reader --------------------------------------------------------------------------------------
@@ -246,16 +250,12 @@ class SspReader:
                 self.fail(STRUCTURE, f"{where}: {name} is not supported", node)
         for (element, connector), side in ((start, "start"), (end, "end")):
             is_own = element == begin.removesuffix(".") and not node.get(f"{side}Element")
-            kind = (
-                ("input" if side == "start" else "output")
-                if is_own
-                else ("output" if side == "start" else "input")
-            )
+            kind = "input" if is_own == (side == "start") else "output"
             if element in self._components or self._kinds.get((element, connector)) == kind:
                 continue
             if not is_own and element not in self.subsystems:
                 continue  # no such component: `check` names it
-            known = [name for owner, name in self._kinds if owner == element]
+            known = [name for (x, name), of in self._kinds.items() if (x, of) == (element, kind)]
             whose = f"system {element!r}" if element else "the system"
             where = f"connection {'.'.join(start)} -> {'.'.join(end)}"
             wrong = f"{whose} has no {kind} {connector!r}{did_you_mean(connector, known)}"
@@ -272,12 +272,16 @@ class SspReader:
         """Return those of components, and inputs that only connectors of systems feed."""
         found, outside = [], []
         for end, start in self._fed:
-            for _ in self._starts:  # through connectors of systems, as many at most
-                start = self._starts.get(start, start)
-            if start in self._kinds:
-                outside.append(".".join(end))
-            else:
+            passed = [start]  # connectors of systems
+            while (start := self._starts.get(passed[-1], start)) not in passed:
+                passed.append(start)
+            if start != passed[-1]:
+                names = " -> ".join(".".join(x) for x in reversed([*passed, start]))
+                raise UserError(f"{self.path}: {STRUCTURE}: a circle of connectors: {names}")
+            if start not in self._kinds:
                 found.append(Connection(*start, *end))
+            elif start[0] == "":
+                outside.append(".".join(end))
         return tuple(found), tuple(outside)
 
     def experiment(

@@ -1,7 +1,7 @@
 """Systems of connected components, however a file describes them, checked against their FMUs."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -177,6 +177,7 @@ class OpenedSystem:
     # what opens a component that is no FMU, by its name: it gives what runs like an Fmu
     python: Mapping[str, Callable[[], Fmu]] = field(default_factory=dict)
     version: str = VERSIONS[0]  # of FMI, of the project's FMUs and built ones
+    solved: Set[str] = frozenset()  # inputs on algebraic loops: their values are first guesses
     read: Sequence[Path] = ()  # files, beside those of FMUs
 
     def variant(self, given: str | None) -> str:
@@ -278,7 +279,7 @@ class OpenedSystem:
                 f"{component!r} has no variable {name!r}{did_you_mean(name, known)}"
             )
         feeding = [c.start for c in self.system.connections if c.end == f"{component}.{name}"]
-        if feeding:
+        if feeding and f"{component}.{name}" not in self.solved:
             raise WrongValueError(f"is connected to {feeding[0]} and cannot be set")
         if f"{component}.{name}" in self.system.inputs:
             raise WrongValueError("is an input that moves")

@@ -14,7 +14,7 @@ from rparm.campaign import work
 from rparm.errors import UserError
 from rparm.systems import ssp_writer
 from rparm.systems.opened import opened
-from tests.support.rparm_project import Console
+from tests.support.rparm_project import Console, repacked
 
 # z = 1 + k u, and a memory: w' = u - w
 GAIN = """
@@ -159,8 +159,43 @@ def test_the_solution_is_the_one_next_to_the_start(
     (tmp_path / "gain.toml").write_text(GAIN, encoding="utf-8")
     file.write_text(text, encoding="utf-8")
     np.testing.assert_allclose(rparm.System(file).run()["b.z"], root, rtol=1e-14)
+    other = rparm.System(file).run(parameters={"a.u": -root})
+    np.testing.assert_allclose(other["b.z"], -root, rtol=1e-14)
     with pytest.raises(UserError, match=r"^no solution of the algebraic loop .* is off by "):
         rparm.System(file).run(parameters={"a.c": -2.0})
+
+
+@pytest.mark.parametrize("derivatives", [True, False])
+@pytest.mark.parametrize("k", [0.5, -1e3, -1e6])
+def test_a_loop_passes_through_zero(tmp_path: Path, derivatives: bool, k: float) -> None:
+    """u = k u - 1 + t, of one FMU."""
+    text = GAIN.replace('"1 + k * u"', '"k * u - 1 + time"').replace("1 + k u", "k u - 1 + t")
+    (tmp_path / "gain.toml").write_text(text, encoding="utf-8")
+    building.build(tmp_path / "gain.toml", output=tmp_path, lock=False)
+    name = "Gain.fmu"
+    if not derivatives:
+        taken = 'providesDirectionalDerivative="true"'
+        name = "Plain.fmu"
+        repacked(tmp_path / "Gain.fmu", tmp_path / name, lambda text: text.replace(taken, ""))
+    file = tmp_path / "loop.toml"
+    file.write_text(
+        f'name = "L"\nstep = 0.1\nstop = 2.0\n[components]\na = "{name}"\n'
+        f'[connections]\n"a.u" = "a.z"\n[parameters]\n"a.k" = {k!r}\n',
+        encoding="utf-8",
+    )
+    exact = (0.1 * np.arange(21) - 1) / (1 - k)
+    bound = 4e-15 if k > 0 else 1e-15
+    np.testing.assert_allclose(rparm.System(file).run()["a.z"], exact, rtol=0, atol=bound)
+
+
+@pytest.mark.parametrize("equation", ["u + 1e-13", "u * u + 0.25 + 1e-11", "u + 1"])
+def test_what_rounding_nearly_solves_has_no_solution(tmp_path: Path, equation: str) -> None:
+    (tmp_path / "square.toml").write_text(SQUARE.replace("u + c - u * u", equation), "utf-8")
+    file = tmp_path / "loop.toml"
+    head = 'name = "L"\nstep = 0.1\nstop = 2.0\n[components]\na = "square.toml"\n'
+    file.write_text(f'{head}[connections]\n"a.u" = "a.z"\n', encoding="utf-8")
+    with pytest.raises(UserError, match=r"^no solution of the algebraic loop of 1 connection "):
+        rparm.System(file).run()
 
 
 # ---- Orders, rates, subsystems -------------------------------------------------------------------
@@ -218,6 +253,37 @@ def test_a_component_steps_at_its_own_rate(folder: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("order", ["jacobi", "gauss_seidel", "extrapolated"])
+def test_python_does_the_same_in_an_ssp(folder: Path, tmp_path: Path, order: str) -> None:
+    text = PI.replace('law = "law.toml"', 'law = { file = "law.py:Law", every = "200 ms" }')
+    text = text.replace("step", f'order = "{order}"\nstep', 1)
+    law = 'class Law:\n    inputs, outputs = ["x"], ["u"]\n    def step(self, t, h, inputs):\n'
+    (folder / "law.py").write_text(f'{law}        return {{"u": 1 - inputs["x"] + t}}\n', "utf-8")
+    (folder / "python.toml").write_text(text, encoding="utf-8")
+    with opened(folder / "python.toml") as system:
+        ssp_writer.write(tmp_path / "Pi.ssp", system)
+    own, of_ssp = (rparm.System(x).run() for x in (folder / "python.toml", tmp_path / "Pi.ssp"))
+    np.testing.assert_array_equal(own["plant.x"], of_ssp["plant.x"])
+
+
+def test_the_whole_is_in_place_of_its_subsystems(folder: Path) -> None:
+    """Inputs that a subsystem's file moves or sets, and its parameters."""
+    inner = 'name = "In"\nstep = 0.1\nstop = 1.0\n[components]\ng = "gain.toml"\nh = "gain.toml"\n'
+    inner += '[inputs]\n"g.u" = { constant = 3 }\n[parameters]\n"h.u" = 4.0\n"g.k" = 2.0\n'
+    (folder / "in.toml").write_text(inner, encoding="utf-8")
+    head = 'name = "Out"\nstep = 0.1\nstop = 1.0\n[components]\nb = "in.toml"\nc = "gain.toml"\n'
+    file = folder / "out.toml"
+    for more, g, h in (
+        ("", 7.0, 3.0),
+        ('[parameters]\nb.g.u = 1.0\n"b.g.k" = 1.0\n', 2.0, 3.0),
+        ('[connections]\n"b.g.u" = "c.z"\n"b.h.u" = "c.z"\n', 3.5, 1.625),
+        ('[inputs]\n"b.h.u" = { constant = 1 }\n', 7.0, 1.5),
+    ):
+        file.write_text(head + more, encoding="utf-8")
+        found = rparm.System(file).run()
+        assert (found["b.g.z"][0], found["b.h.z"][0]) == (g, h)
+
+
 def test_subsystems_are_drawn_saved_and_built(
     folder: Path, tmp_path: Path, console: Console
 ) -> None:
@@ -231,7 +297,10 @@ def test_subsystems_are_drawn_saved_and_built(
     file.write_text(whole, encoding="utf-8")
     with opened(file) as system:
         assert system.system.subsystems == ("left", "right")
-        assert any("the order of inner.toml does not apply" in note for note in system.notes)
+        assert any(
+            "subsystem left, right: its file's order does not apply" in note
+            for note in system.notes
+        )
         ssp_writer.write(tmp_path / "Both.ssp", system)
     table = rparm.System(file).run()
     assert (table["left.plant.x"][0], table["right.plant.x"][0]) == (0.5, 0.25)
