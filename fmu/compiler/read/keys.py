@@ -105,6 +105,11 @@ def reason(name: str, is_rate: bool) -> str:
     return "the C code uses it" if name in RESERVED else "the FMU has a variable of this name"
 
 
+def named(name: str) -> str:
+    """Return a name as messages have it: in quotes if it is none."""
+    return name if re.fullmatch(rf"{NAME.pattern}(\[[^]]+\].*)?", name) else shown(name)
+
+
 def plain_text(value: object) -> str:
     """Return a text in one line."""
     TEXT(value)
