@@ -277,7 +277,7 @@ def _keys(section: str, entry: object, file: ModelFile) -> tuple[tuple[str, ...]
         return keys.SECTIONS[section][0], ""
     known, needed = keys.SECTIONS[section]
     if section == "parameters" and isinstance(entry, dict) and "value" in entry:
-        known, needed = keys.OWN_KEYS[FOLLOWS]
+        known, needed = keys.FOLLOWING_COUNTS if "type" in entry else keys.OWN_KEYS[FOLLOWS]
     elif section in keys.NOT_REAL and isinstance(entry, dict) and "type" in entry:
         known, needed = keys.OWN_KEYS[keys.NOT_REAL[section]]
     if file.is_by_hand:
@@ -289,24 +289,23 @@ def _keys(section: str, entry: object, file: ModelFile) -> tuple[tuple[str, ...]
 
 def _section(section: str, given: dict[str, Any]) -> str:
     """Return the section of a variable by its type, which becomes its kind."""
-    if section == "parameters" and "value" in given:
-        return FOLLOWS
     kind = given.pop("type", NUMBER)
+    follows = section == "parameters" and "value" in given
     if kind == NUMBER:
-        return section
+        return FOLLOWS if follows else section
     if section == "inputs" and kind != CONDITION:
         raise ModelFileError(f'type: expected "{BOOLEAN}": other inputs are real numbers')
     if kind != WHOLE and {"min", "max"} & given.keys():
         raise ModelFileError("min and max are for numbers")
     given["kind"] = kind
-    return keys.NOT_REAL[section]
+    return FOLLOWS if follows else keys.NOT_REAL[section]
 
 
 def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> None:
     """Read a start value by its kind; one that follows from parameters goes into the texts."""
     kind, start = given.get("kind", NUMBER), given.get("start")
     if isinstance(kind, tuple) and (start is None or start in kind):
-        if section not in keys.CALCULATED:
+        if section not in (*keys.CALCULATED, FOLLOWS):
             given["start"] = kind.index(start or kind[0]) + 1
         return
     wanted = "true or false" if kind == CONDITION else kind

@@ -59,6 +59,7 @@ OWN_KEYS = {
     "where": ((*OF_COUNTS, "shown"), "value"),
     "outputs": (OF_COUNTS, "value"),
 }
+FOLLOWING_COUNTS = OWN_KEYS["outputs"]  # parameters that follow, as outputs
 NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
