@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..expressions.expression import Node, with_names
+from ..expressions.expression import ExpressionError, Node, in_order, with_names
 from ..expressions.kinds import CONDITION, NUMBER, WHOLE
 from ..expressions.parser import table_unit
 from ..units import ANGLE, BASE, Unit
@@ -485,6 +485,12 @@ def _local(
             if name in (*file.indexes, *element.indexes):
                 raise ModelFileError("this name is an index of for, too")
         own = file.expression(element, whole, text, None, event="then")
+        for node in in_order([own.tree]):
+            if node.op == "name" and node.name in entries and node.name not in known:
+                below = "is this entry itself" if node.name == name else "stands below"
+                wanted = f"{shown(node.name)} {below}: expected a name that stands above"
+                with placed(*whole):
+                    raise ExpressionError(node.column, wanted)
         own.tree = with_names(own.tree, known)
         known[name] = own.tree
         found.append(own)
