@@ -31,7 +31,14 @@ def described(
     }
     shared = {"declaration": declaration, "origin": origin, "prefix": version}
     shared["displays"] = {unit: display_units(unit, declaration) for unit in declaration.units}
+    shared["without_base"] = without_base(declaration)
     return filled(f"{version}/modelDescription.xml.in", **shared, **values)
+
+
+def without_base(declaration: Declaration) -> set[str]:
+    """Return the units with halves as exponents: those of a BaseUnit are whole."""
+    units = declaration.units.items()
+    return {name for name, of in units if any(e.denominator > 1 for e in of.values())}
 
 
 def display_units(unit: str, declaration: Declaration) -> list[Display]:

@@ -65,27 +65,27 @@ def parameter_set(scenario: Scenario, description: ET.Element) -> str:
     """Text of the .ssv (SSP 1.0) with the values that are not the start values of the FMU."""
     scalars = description.iterfind("ModelVariables/ScalarVariable")
     variables = {scalar.get("name"): scalar[0] for scalar in scalars}
-    values, units = {}, set()
+    bases = {unit.get("name"): unit.find("BaseUnit") for unit in description.iter("Unit")}
+    values, units = {}, {}
     for name, value in scenario.values.items():
         variable = variables.get(name)
         if variable is None:
             raise WrongInputError(f"{scenario.path}: '{name}' is not declared")
         items = items_of(description, variable.get("declaredType"))
-        values[name] = typed(variable, items, value, f"{scenario.path}: {name}")
-        units |= {variable.get("unit")} - {None}
-    exponents = {unit: exponents_of(description, unit) for unit in sorted(units)}
-    return filled("parameters.ssv.in", scenario=scenario, values=values, units=exponents)
+        kind, keys = typed(variable, items, value, f"{scenario.path}: {name}")
+        base = bases.get(keys.pop("unit", None))  # one with halves has none, which SSP needs
+        if base is not None:
+            keys["unit"] = variable.get("unit")
+            units[keys["unit"]] = base.attrib
+        values[name] = kind, keys
+    units = dict(sorted(units.items()))
+    return filled("parameters.ssv.in", scenario=scenario, values=values, units=units)
 
 
 def items_of(description: ET.Element, name: str | None) -> list[str | None]:
     """Return the items of a type, if it is an enumeration."""
     path = f"TypeDefinitions/SimpleType[@name='{name}']/Enumeration/Item"
     return [item.get("name") for item in description.iterfind(path)]
-
-
-def exponents_of(description: ET.Element, unit: str) -> dict[str, str]:
-    """Return the exponents of the SI base units."""
-    return description.find(f"UnitDefinitions/Unit[@name='{unit}']/BaseUnit").attrib
 
 
 def typed(

@@ -339,7 +339,7 @@ class System:
         step: float | str | None = None,
         engine: str = "master",
     ) -> Table:
-        """Step a variant from its start to its stop time, in Jacobi order.
+        """Step a variant from its start to its stop time, in its file's order.
 
         Parameters
         ----------

@@ -61,7 +61,14 @@ NO_CACHE = "RPARM_NO_CACHE"  # variable of the environment, which --no-cache set
 EQUATIONS = {"states", "discrete", "sampled", "algebraic", "where", "outputs"}
 EQUATIONS |= {"experiment", "modes"}
 VARIABLE = re.compile(r"\s*\w+(\.\w+|\[[\d,\s]+\])+\s*")
-OF_LOOP = {"start", "stop", "step", "keep", "variants"}  # keys of systems of components only
+OF_LOOP = {
+    "start",
+    "stop",
+    "step",
+    "order",
+    "keep",
+    "variants",
+}  # keys of systems of components only
 # command -> the files that it takes, and keys that such a file has and others do not
 KINDS = {
     "system": ("a system", {"components", "connections"}),

@@ -199,8 +199,9 @@ def minus(text: object) -> str:
 
 def unit(text: str | None) -> str:
     """Write a unit of FMI as N·m for N.m, m/s² for m/s2; nothing for none."""
-    raised = re.sub(r"(?<=[a-z])[23]", lambda found: {"2": "²", "3": "³"}[found[0]], text or "")
-    return raised.replace(".", "·")
+    powers = {"2": "²", "3": "³"}
+    raised = re.sub(r"(?<=[a-z])[23](?!\.?\d)", lambda found: powers[found[0]], text or "")
+    return re.sub(r"\.(?!\d)", "·", raised)
 
 
 def prefixed(text: str, largest: float) -> tuple[str, float]:

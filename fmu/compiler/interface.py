@@ -5,6 +5,8 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from .units import Exponents
+
 # what users do not depend on: texts, and where C keeps the value
 HIDDEN = ("owner", "field", "description", "display", "constants")
 
@@ -87,7 +89,7 @@ class Declaration:
     values: str
     symbol: str
     experiment: Mapping[str, float]  # start, stop, step, tolerance
-    units: Mapping[str, Mapping[str, int]]  # exponents of the base units and rad, if not 0
+    units: Mapping[str, Exponents]
     variables: Mapping[str, Variable]
     terminals: Mapping[str, Terminal]
     indicators: tuple[str, ...]  # of events, in the order of the model
@@ -119,7 +121,7 @@ class Declaration:
             for name, v in self.variables.items()
         }
         interface = [self.name, self.units, variables, self.indicators, self.has_time_events]
-        text = json.dumps([*interface, *versions], sort_keys=True)
+        text = json.dumps([*interface, *versions], sort_keys=True, default=str)
         digest = hashlib.sha256(text.encode()).hexdigest()
         parts = (digest[0:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])
         return "{" + "-".join(parts) + "}"

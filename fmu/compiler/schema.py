@@ -112,7 +112,8 @@ def _further(named: Schema) -> dict[str, Schema]:
     experiment["tolerance"] |= {"exclusiveMaximum": 1}
     mode = {"type": "string", "pattern": WITH_INDEXES, **named}
     modes = {"anyOf": [TRUTH, _table({"start": _start(TRUTH), FOR: EXPRESSION})]}
-    unit = _table(dict.fromkeys((*BASE, ANGLE), {"type": "integer", "minimum": -99, "maximum": 99}))
+    exponent = NUMBER | {"multipleOf": 0.5, "minimum": -99.5, "maximum": 99.5}
+    unit = _table(dict.fromkeys((*BASE, ANGLE), exponent))
     size = {"type": "integer", "minimum": 0, "maximum": reader.MOST_SIZE}
     of_functions = {"not": {"enum": sorted(reader.TAKEN)}}
     arguments = ITEMS | {"items": WORD | {"not": {"enum": sorted(reader.RESERVED)}}}

@@ -13,8 +13,10 @@ from fractions import Fraction
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 ANGLE = "rad"
+Exponents = Mapping[str, int | Fraction]  # of base units and rad, if not 0; halves are fractions
 DEGREE = Fraction(math.pi) / 180  # rad
 SAME = Fraction(1, 10**12)  # FMUs write as many digits of it as they like
+ROOT_DIGITS = 10**60  # in front of the point, of roots that are no fractions
 
 # units with a symbol, as products of those before
 DERIVED = {
@@ -34,9 +36,11 @@ SCALED = {
     "g": (Fraction(1, 1000), "kg"), "t": (Fraction(1000), "kg"), "l": (Fraction(1, 1000), "m3"),
 }  # fmt: skip
 CELSIUS, ZERO_CELSIUS = "degC", Fraction("273.15")
-OTHER_SIGN = re.compile(r"\d\.?\d|[\^*·]")
-FACTOR = re.compile(r"([A-Za-z]+)(-?[1-9])?", re.ASCII)
-PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
+OTHER_SIGN = re.compile(r"\d\d|\.\d|\d/\d|[\^*·√]|sqrt")
+POINT = r"\.(?![0-9])"  # that multiplies, and is not that of m0.5
+FACTOR = re.compile(r"([A-Za-z]+)(-?(?:[1-9]|[0-9]\.5))?", re.ASCII)
+# a.b, a/b or a/(b.c)
+PRODUCT = re.compile(rf"([^/()]+)(?:/(?:((?:(?!{POINT})[^/()])+)|\(([^/()]+)\)))?")
 # in declarations without a word; what has no name gets the first with the same exponents
 STANDARD = (
     "1", "1/s", "1/s2", "1/s3", "A", "A/s", "Hz", "J", "kg", "kg.m", "kg.m2", "m", "m/s", "m/s2",
@@ -50,7 +54,7 @@ DISPLAYED = {"rad": ["deg"], "rad/s": ["deg/s"]}  # in tools, unless a file says
 class Unit:
     """A unit, in which a number stands for the value factor * number + offset of another one."""
 
-    exponents: dict[str, int]  # of base units and rad, if not 0
+    exponents: Exponents
     factor: Fraction = Fraction(1)
     offset: Fraction = Fraction(0)
     base: str = ""  # the other one: of SI, with prefixes left out; "": it has no name in the text
@@ -87,32 +91,47 @@ def parsed(text: str) -> Unit:
     """Read a product of symbols; ValueError if it is none."""
     if text == CELSIUS:
         return Unit({"K": 1}, offset=ZERO_CELSIUS, base="K")
-    hint = ": exponents are whole, from -9 to 9, and a point multiplies"
+    hint = ": exponents are whole or halves, as in Hz0.5, up to 9.5, and a point multiplies"
     hint = hint if OTHER_SIGN.search(text) else ""
     product = PRODUCT.fullmatch(text)
     if product is None or (text.startswith("1") and text != "1" and not text.startswith("1/")):
         raise ValueError(f"unit {text!r} is no product of SI symbols such as kg.m/s2{hint}")
-    found: dict[str, int] = {}
-    total, bases = Fraction(1), text
+    found: dict[str, Fraction] = {}
+    square, bases = Fraction(1), text  # of the factor
     for part, sign in ((product[1], 1), (product[2] or product[3], -1)):
-        for factor in part.split(".") if part and part != "1" else ():
+        for factor in re.split(POINT, part) if part and part != "1" else ():
             symbol = FACTOR.fullmatch(factor)
             known = _scaled(symbol[1]) if symbol else None
             if known is None:
                 expected = f"SI symbol with an exponent, such as s2{hint}"
                 raise ValueError(f"unit {text!r}: {factor!r} is no {expected}")
-            power = sign * int(symbol[2] or 1)
+            power = sign * Fraction(symbol[2] or 1)
             scale, base = known
-            total *= scale**power
+            square *= scale ** int(2 * power)
             bases = re.sub(rf"(?<![A-Za-z]){symbol[1]}(?![A-Za-z])", base, bases)
             of_base = SYMBOLS[base] if base in SYMBOLS else parsed(base).exponents
             for unit, exponent in of_base.items():
-                found[unit] = found.get(unit, 0) + power * exponent
-    found = {unit: exponent for unit, exponent in found.items() if exponent}
-    return Unit(found, total, base=bases if total == 1 or _is_of_si(bases, found) else "")
+                found[unit] = found.get(unit, Fraction(0)) + power * exponent
+    exponents = {unit: whole(exponent) for unit, exponent in found.items() if exponent}
+    has_name = square == 1 or _is_of_si(bases, exponents)
+    return Unit(exponents, _root(square), base=bases if has_name else "")
 
 
-def _is_of_si(text: str, expected: dict[str, int]) -> bool:
+def whole(exponent: Fraction) -> int | Fraction:
+    """Return an exponent as a whole number, if it is one."""
+    return int(exponent) if exponent.denominator == 1 else exponent
+
+
+def _root(square: Fraction) -> Fraction:
+    """Return the root of a fraction: exact if it is one itself, else its first digits."""
+    above, below = math.isqrt(square.numerator), math.isqrt(square.denominator)
+    if Fraction(above, below) ** 2 == square:
+        return Fraction(above, below)
+    digits = square.denominator * ROOT_DIGITS
+    return Fraction(math.isqrt(square.numerator * digits * ROOT_DIGITS), digits)
+
+
+def _is_of_si(text: str, expected: Exponents) -> bool:
     """Return whether a text is the unit of SI with these exponents."""
     with suppress(ValueError):
         return parsed(text) == Unit(expected, base=text)
@@ -136,11 +155,17 @@ for _symbol, _product in DERIVED.items():
     SYMBOLS[_symbol] = parsed(_product).exponents
 
 
-def shown(exponents: Mapping[str, int | Fraction]) -> str:
+def shown(exponents: Exponents) -> str:
     """Write exponents as a message names a unit: kg.m/s2."""
-    above = [f"{b}{e if e != 1 else ''}" for b, e in exponents.items() if e > 0]
-    below = [f"{b}{-e if e != -1 else ''}" for b, e in exponents.items() if e < 0]
+    above = [f"{b}{_shown(e)}" for b, e in exponents.items() if e > 0]
+    below = [f"{b}{_shown(-e)}" for b, e in exponents.items() if e < 0]
     text = ".".join(above) or "1"
     if not below:
         return text
     return f"{text}/{below[0]}" if len(below) == 1 else f"{text}/({'.'.join(below)})"
+
+
+def _shown(exponent: int | Fraction) -> str:
+    if exponent == 1:
+        return ""
+    return f"{float(exponent)}" if exponent.denominator == 2 else f"{exponent}"

@@ -75,7 +75,8 @@ class ModelDescription {
 
   /** A unit of FMI as it is written: N·m for N.m, m/s² for m/s2. @param {string} text */
   static unit(text) {
-    return text.replace(/(?<=[a-z])[23]/g, digit => (digit === '2' ? '²' : '³')).replaceAll('.', '·');
+    const raised = text.replace(/(?<=[a-z])[23](?!\.?\d)/g, digit => (digit === '2' ? '²' : '³'));
+    return raised.replace(/\.(?!\d)/g, '·');
   }
 
   /** @returns {Variable} */

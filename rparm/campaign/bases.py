@@ -16,13 +16,14 @@ import numpy as np
 
 from rparm import building, project
 from rparm.campaign.campaign_file import Campaign, checked
-from rparm.campaign.job import Archive, Component, HeldInputs
+from rparm.campaign.job import Archive, Component, HeldInputs, Wiring
 from rparm.errors import UserError, WrongValueError, did_you_mean, placed
 from rparm.fmi.compiled_loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.runs import scenario
 from rparm.runs.scenario import Scenario
+from rparm.systems import master
 from rparm.systems.connected_instance import start_value
 from rparm.systems.opened import opened as open_system
 from rparm.systems.opened import system_file
@@ -42,6 +43,7 @@ class Base(ABC):
     KIND: ClassVar[str]  # for messages
     archives: dict[str, Archive]  # FMUs and Python components by their hash
     tolerance: float | None = None
+    wiring: Wiring | None = None  # of a system that the project's master steps
     questions: tuple[str, ...] = ()  # to ask the user about the scenario or system
     _fed: Collection[str] = ()  # inputs that outputs feed
 
@@ -195,7 +197,10 @@ class SystemBase(Base):
             read = repr(content.__reduce__()).encode() if is_python else content
             self._hashes[name] = _sha256(read)
             self.archives[self._hashes[name]] = content
-        moved = self._system.inputs
+        system = self._system
+        if master.is_needed(system, opened.models):
+            self.wiring = Wiring(system.connections, system.order, dict(system.rates))
+        moved = system.inputs
         self._fed = {*(c.end for c in self._system.connections), *moved}
         for name, signal in moved.items():
             kind = opened.variable(name).type

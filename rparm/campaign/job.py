@@ -13,6 +13,7 @@ from numba import njit
 from rparm.fmi.compiled_loop import Part
 from rparm.fmi.model import Value
 from rparm.systems.python_component import PythonComponent
+from rparm.systems.structure import Connection
 
 Archive = bytes | PythonComponent  # content of an FMU, or a component in Python
 PLAIN = ("start", "final", "minimum", "maximum", "rms", "integral")  # of one variable
@@ -175,6 +176,15 @@ class Target:
 
 
 @dataclass(frozen=True)
+class Wiring:
+    """What the project's master needs of a system that compiled code does not step."""
+
+    connections: tuple[Connection, ...]
+    order: str
+    rates: dict[str, float]  # s
+
+
+@dataclass(frozen=True)
 class Job:
     """All runs of a campaign, without their parameters."""
 
@@ -194,6 +204,7 @@ class Job:
     measures: tuple[Measure, ...]
     trajectories: frozenset[int]  # runs of which all that is recorded is kept
     hashes: dict[str, str]  # SHA-256 of the files that determine the runs
+    wiring: Wiring | None = None
 
     @property
     def steps(self) -> int:

@@ -93,6 +93,7 @@ class _Planner:
             measures=tuple(measures),
             trajectories=frozenset(campaign.keep.trajectories),
             hashes=base.hashes,
+            wiring=base.wiring,
         )
 
     # ---- Values that are set -----------------------------------------------------------------

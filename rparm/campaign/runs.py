@@ -14,6 +14,7 @@ from typing import cast
 import numpy as np
 from distributed import Worker, WorkerPlugin, get_worker
 
+from rparm.campaign import mastered
 from rparm.campaign.job import Archive, Job, Recorded, Target
 from rparm.errors import UserError, one_line
 from rparm.fmi.compiled_loop import Stepper, Tangent
@@ -80,6 +81,9 @@ class Runner(AbstractContextManager["Runner"]):
     def _run(self, point: np.ndarray) -> str:
         """Make one run; why it failed, or an empty text."""
         try:
+            if self._job.wiring is not None:
+                self._run_in_master(point)
+                return ""
             self._initialize(point)
             self._advance()
             self._integers = [self._instances[c].integer(v) for c, v in self._job.integers.values()]
@@ -89,6 +93,14 @@ class Runner(AbstractContextManager["Runner"]):
                 self._stack.close()
             self._instances = []
             return one_line(error)[:LONGEST_REASON]
+
+    def _run_in_master(self, point: np.ndarray) -> None:
+        for (_, target), value in zip(self._job.targets, point, strict=True):
+            if not np.isfinite(value):
+                raise UserError(f"{target.variable}: its value is not defined")
+            if target.held is not None:
+                self._held[:, target.held] = value
+        self._integers = mastered.run(self._job, self._fmus, point, self._held, self._record)
 
     # ---- Initialization --------------------------------------------------------------------------
 

@@ -15,10 +15,11 @@ from rparm.report import overview
 from rparm.report.overview import FAILED, PASSED, RAN
 from rparm.report.pages import PageTable, RunPage
 from rparm.report.run_data import Axis, Curve, Plot, RunData
-from rparm.systems import comparison, master
+from rparm.systems import comparison
 from rparm.systems.comparison import HALVINGS, CouplingStudy, Halved
+from rparm.systems.master import INPUT_MODES, ORDERS
 from rparm.systems.opened import SUFFIXES, given_file, opened, system_file
-from rparm.systems.structure import OpenedSystem
+from rparm.systems.structure import WAYS, OpenedSystem
 from rparm.units import duration, exponents, short
 from rparm.units import verdict as passed_or_failed
 
@@ -49,7 +50,7 @@ def do_coupling(options: argparse.Namespace) -> Ended:
 def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> Ended:
     name = system.system.name
     console.stage(f"halving the step of {name}, {variant}")
-    ways = master.ways(system.models, system.system.connections)
+    ways = [(order, inputs) for inputs in INPUT_MODES for order in ORDERS]
     total = len(ways) * system.system.steps * (2 ** (HALVINGS + 1) - 1)
     with Progress(name, total) as progress:
         found = [comparison.halve(system, variant, way, progress) for way in ways]
@@ -64,7 +65,7 @@ def _halved(system: OpenedSystem, variant: str, options: argparse.Namespace) -> 
         console.remark(table.note)
     if note:
         console.remark(note)
-    first = found[0]
+    first = next(x for x in found if (x.order, x.inputs) == WAYS[system.system.order])
     title = f"{name}, {variant}: errors of the coupling"
     curves = [Curve(f"{x.order.replace('_', '-')}, {x.inputs}", x.errors[::-1]) for x in found]
     axis = Axis("communication step", "ms", log=True)

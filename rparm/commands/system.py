@@ -116,8 +116,9 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
         why_not = ecos.absent() if section.folder else ecos.unsuited(section.ssp)
         engine, where = (master.run_in_master, "this process") if why_not else (ecos.run, "Ecos")
         if why_not:
-            steps = f"the master of rparm steps {section.name}, in the same order as Ecos"
-            print(f"{why_not}: {steps}")
+            steps = f"the master of rparm steps {section.name}"
+            same = ", in the same order as Ecos" * (section.ssp.system.order == "jacobi")
+            print(f"{why_not}: {steps}{same}")
         console.stage(f"simulating {counted(references, 'variant')} of {section.name} in {where}")
         error_title = "error" if section.folder else "coupling error"
         table = VariantTable(references, section.measures, error_title)
@@ -138,6 +139,10 @@ def _run(chosen: Sequence[tuple[Section, Sequence[str]]], options: argparse.Name
             if outcome.is_estimate:
                 console.remark(system_page.estimate(outcome))
                 found = {f"coupling_{key}": value for key, value in found.items()}
+                if outcome.cheaper:
+                    found |= dict(
+                        zip(("cheaper_order", "cheaper_error"), outcome.cheaper, strict=True)
+                    )
                 if outcome.exact_errors:
                     console.remark(system_page.true_error(outcome))
                     worst = max(outcome.exact_errors, key=outcome.exact_errors.__getitem__)
@@ -190,6 +195,6 @@ def _simulated(
         with Progress(name, steps) as progress:
             return comparison.simulate(section.ssp, name, reference, engine, progress)
     estimates = not comparison.why_no_estimate(section.ssp)
-    with Progress(name, 3 * steps if estimates else steps) as progress:
+    with Progress(name, 5 * steps if estimates else steps) as progress:
         outcome = comparison.run_alone(section.ssp, name, section.names, engine, progress)
     return comparison.with_exact(outcome, section.ssp, section.names) if exact else outcome

@@ -23,6 +23,7 @@ from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.interruption import ENDINGS
 from rparm.systems.connected_instance import begin_instance, check_finite
+from rparm.systems.master import is_needed
 from rparm.systems.structure import Connection, OpenedSystem
 
 Result = TypeVar("Result")
@@ -72,6 +73,9 @@ class Part:
 def parts(ssp: OpenedSystem, variant: str) -> dict[str, Part]:
     """Return the parts of a variant, by component; UserError if it is unknown."""
     system, variant = ssp.system, ssp.variant(variant)
+    if is_needed(system, ssp.models):
+        expected = "expected Jacobi order, one step and no algebraic loop"
+        raise UserError(f"{ssp.path}: processes step side by side: {expected}")
     published = {name: model.real_outputs for name, model in ssp.models.items()}
     whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"
 

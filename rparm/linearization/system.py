@@ -130,6 +130,9 @@ class SystemSubject(ExitStack):
         """
         if not self.python and not any(part.ticks for part in parts.values()):
             return connected(parts, self.kept)
+        if self.python and master.is_needed(self.ssp.system, self.ssp.models):
+            expected = "expected Jacobi order without rates and algebraic loops"
+            raise UserError(f"{self.ssp.path}: {self.python[0]} is in Python: {expected}")
         step, feeding = self.ssp.system.step, [c.start for c in self.connections]
         with placed(self.ssp.path):
             found, whole = (

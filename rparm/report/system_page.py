@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,6 +23,7 @@ from rparm.report.scenario_page import cells, meanings
 from rparm.runs.inputs import Log
 from rparm.systems import comparison, ecos
 from rparm.systems.comparison import BOUND, Diagram, Measure, Outcome, Study, load_study
+from rparm.systems.feedthrough import loops, sequence
 from rparm.systems.structure import OpenedSystem
 from rparm.units import duration, exponents, seconds, short, unit
 
@@ -196,7 +197,11 @@ def estimate(outcome: Outcome) -> str:
     if not outcome.errors:
         return f"coupling error not estimated: {outcome.why}"
     size = exponents(f"{outcome.error:.2g}")
-    return f"coupling error about {size} ({outcome.worst}), by half the step"
+    found = f"coupling error about {size} ({outcome.worst}), by half the step"
+    if outcome.cheaper:
+        order, error = outcome.cheaper
+        found += f"; order {order} would have about {exponents(f'{error:.2g}')}"
+    return found
 
 
 def true_error(outcome: Outcome) -> str:
@@ -337,7 +342,28 @@ def _description(section: Section, variant: str) -> str:
     why_not = "" if section.folder else ecos.unsuited(section.ssp)
     by = f"rparm's own master ({why_not})" if why_not else "Ecos"
     how = f"Run by {by} with steps of {duration(system.step)}."
+    how += " ".join(["", *_coupled(section.ssp)])
     return f"{said.rstrip('.')}. {how}" if said else how
+
+
+def _coupled(ssp: OpenedSystem) -> Iterator[str]:
+    """Say in which order components step, at which rates, and what is solved for."""
+    system = ssp.system
+    if system.order == "gauss_seidel":
+        names = sequence(ssp.models, system.connections, ssp.models)
+        yield f"Components step one after the other, by direct feedthrough: {', '.join(names)}."
+    elif system.order == "extrapolated":
+        yield "Inputs are continued over each step, as lines."
+    rates = [f"{name} every {duration(every)}" for name, every in system.rates.items()]
+    if rates:
+        yield f"Rates: {', '.join(rates)}."
+    real = [c for c in system.connections if ssp.variable(c.start).type == "Real"]
+    for loop in loops(real, ssp.models):
+        yield (
+            f"Solved together at each communication point, by Newton's method from the values "
+            f"before: {', '.join(c.end for c in loop)}. Of several solutions it is the one that "
+            "this leads to."
+        )
 
 
 def _parameters(ssp: OpenedSystem, variant: str) -> list[PageTable]:

@@ -4,6 +4,7 @@ Here is also what study.py in the folder of a system must define.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -21,9 +22,10 @@ from rparm.runs import comparison
 from rparm.runs.comparison import Compared, Summed
 from rparm.systems import ecos
 from rparm.systems.master import master_of, run_in_master
-from rparm.systems.structure import Component, Connector, OpenedSystem
+from rparm.systems.structure import WAYS, Component, Connector, OpenedSystem
 
 WHOLE = "whole"  # the name of a system as one component
+ROUNDING = 1e-9  # of an error that no order improves
 PARTS = 32  # of a step, over which the whole system holds an input
 BOUND = 1e-7  # on the relative error of every variable
 
@@ -52,6 +54,7 @@ class Outcome(Compared):
     errors: dict[str, float]  # largest of each variable, relative
     why: str = ""  # there are no errors, in an estimate
     is_estimate: bool = False
+    cheaper: tuple[str, float] | None = None  # an order that would halve the error, and its error
     exact: np.ndarray | None = None  # (rows, names): the same system as one FMU
     exact_errors: dict[str, float] = field(default_factory=dict)  # likewise, from that
 
@@ -82,21 +85,49 @@ def run_alone(
     """Run a variant that has no reference; estimate the coupling error by half the step.
 
     Inputs that are held over a step are late by half of it, on the average: an error of first
-    order, twice the difference between both runs.
+    order, twice the difference between both runs. Both lead to a limit, which the other orders of
+    steps are compared with.
     """
     run = engine(ssp, variant, names, progress)
-    errors, why = {}, why_no_estimate(ssp)
+    errors, cheaper, why = {}, None, why_no_estimate(ssp)
     if not why:
         half = replace(ssp, system=ssp.system.with_step(ssp.system.step / 2))
         real = [name for name in kept(ssp) if ssp.variable(name).type == "Real"]
         columns = [names.index(name) for name in real]
         try:
             finer = engine(half, variant, names, progress).values[::2, columns]
-            apart = np.abs(run.values[:, columns] - finer).max(axis=0)
-            errors = dict(zip(real, (2 * apart / _sizes(ssp, real, finer)).tolist(), strict=True))
+            power = 2.0 ** order_of(WAYS[ssp.system.order][1])
+            limit = finer + (finer - run.values[:, columns]) / (power - 1)
+            sizes = _sizes(ssp, real, finer)
+            found = np.abs(run.values[:, columns] - limit).max(axis=0) / sizes
+            errors = dict(zip(real, found.tolist(), strict=True))
+            cheaper = _cheaper(ssp, variant, real, limit, sizes, float(found.max()), progress)
         except UserError as error:  # an FMU may allow one step only
             why = f"half the step fails, {error}"
-    return Outcome(variant, ssp.system.steps, run, errors, why, is_estimate=True)
+    return Outcome(
+        variant, ssp.system.steps, run, errors, why, is_estimate=True, cheaper=cheaper
+    )  # fmt: skip
+
+
+def _cheaper(
+    ssp: OpenedSystem,
+    variant: str,
+    names: Sequence[str],
+    limit: np.ndarray,
+    sizes: np.ndarray,
+    error: float,
+    progress: Callable[[int], object],
+) -> tuple[str, float] | None:
+    """Return the order whose error is smallest, if that is at most half of this one's."""
+    errors = {}
+    for order in WAYS.keys() - {ssp.system.order}:
+        other = replace(ssp, system=replace(ssp.system, order=order))
+        with suppress(UserError):
+            values = run_in_master(other, variant, names, progress).values
+            errors[order] = float((np.abs(values - limit).max(axis=0) / sizes).max())
+    best = min(sorted(errors), key=errors.__getitem__, default="")
+    halves = best and error > ROUNDING and errors[best] <= error / 2
+    return (best, errors[best]) if halves else None
 
 
 def with_exact(outcome: Outcome, ssp: OpenedSystem, names: Sequence[str]) -> Outcome:

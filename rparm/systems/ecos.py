@@ -212,7 +212,7 @@ def _as_ecos_opens(ssp: "OpenedSystem", variant: str, folder: Path) -> Path:
         from rparm.systems import ssp_writer  # the child needs none of it
 
         only = replace(ssp.system, parameters={variant: ssp.system.parameters[variant]})
-        ssp_writer.write(folder / "system.ssp", replace(ssp, system=only))
+        ssp_writer.write(folder / "system.ssp", replace(ssp, system=only), flat=True)
         return folder / "system.ssp"
     try:
         str(path).encode()

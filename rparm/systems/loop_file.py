@@ -109,6 +109,7 @@ class LoopReader(Sections):
             connections=tuple(connections), start=start, stop=stop, step=step,
             parameters=parameters, descriptions=descriptions, description=description, order=order,
             rates={c: x.every for c, x in components.items() if x.every is not None},
+            subsystems=tuple(given.subsystems),
         )  # fmt: skip
         check(self.path, system, self.models)
         system = self.with_inputs(system, self.moved)

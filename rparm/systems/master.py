@@ -41,7 +41,7 @@ from rparm.systems.connected_instance import ConnectedInstance, check_finite
 from rparm.systems.ecos import Run, said_at_end
 from rparm.systems.feedthrough import loops, sequence
 from rparm.systems.python_component import is_python
-from rparm.systems.structure import WAYS, Connection, OpenedSystem, split
+from rparm.systems.structure import WAYS, Connection, OpenedSystem, System, split
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUT_MODES = ("held", "extrapolated")
@@ -462,6 +462,16 @@ def ways(models: Mapping[str, Model], connections: Iterable[Connection]) -> list
         if models[c.start_component].variables[c.start_connector].type == "Real"
     )
     return [(order, inputs) for inputs in INPUT_MODES[: 1 + can] for order in ORDERS]
+
+
+def is_needed(system: System, models: Mapping[str, Model]) -> bool:
+    """Whether a system has more than steps side by side: an order, rates, algebraic loops."""
+    reals = [
+        c
+        for c in system.connections
+        if models[c.start_component].variables[c.start_connector].type == "Real"
+    ]
+    return bool(system.order != "jacobi" or system.rates or loops(reals, models))
 
 
 # ---- Of a file -----------------------------------------------------------------------------------

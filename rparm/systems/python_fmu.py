@@ -48,7 +48,7 @@ def pack(name: str, component: PythonComponent, fixed: Mapping[str, Any], path: 
         "units": {name: v.unit for name, v in own.items() if v.unit},
         "fixed": fixed,
     }
-    class_name = name + "_" * keyword.iskeyword(name)
+    class_name = name.replace(".", "_") + "_" * keyword.iskeyword(name)
     with temporary_folder() as folder:
         caller, data = folder / f"{class_name}_caller.py", folder / f"{class_name}.json"
         text = Path(__file__).with_name(CALLER).read_text(encoding="utf-8")

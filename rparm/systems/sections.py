@@ -49,6 +49,7 @@ class Flat:
     """Sections by "component.variable", of a file with all its subsystems."""
 
     components: dict[str, Given] = field(default_factory=dict)
+    subsystems: list[str] = field(default_factory=list)  # names, each before those in it
     connections: dict[str, Any] = field(default_factory=dict)
     inputs: dict[str, Any] = field(default_factory=dict)
     parameters: dict[str, Any] = field(default_factory=dict)
@@ -126,6 +127,7 @@ class Sections(Reader):
         for end, start in inner.connections.items():
             fed_by = f"{name}.{start}" if isinstance(start, str) else start
             found.connections[f"{name}.{end}"] = fed_by
+        found.subsystems += [name, *(f"{name}.{own}" for own in inner.subsystems)]
         beside = os.path.relpath(path.parent, self.path.parent)
         for end, signal in inner.inputs.items():
             if isinstance(signal, dict) and isinstance(signal.get(FILE), str):

@@ -1,9 +1,10 @@
 """SSP 1.0 archives: unpacked, read and checked, once.
 
-Accepted is what the engines run: one flat system of FMUs, with outputs connected to inputs and
-parameter sets bound at the components. All sets of a component apply; but where one is bound first
-and last, each set name is a variant of the system. Times that the SSP does not say are chosen by
-the default experiments of the FMUs. Nothing runs before a system is checked against its FMUs.
+Accepted are systems of FMUs and of such systems, with outputs connected to inputs and parameter
+sets bound at the components; names in a system within begin with its own. All sets of a component
+apply; but where one is bound first and last, each set name is a variant of the system. Times that
+the SSP does not say are chosen by the default experiments of the FMUs. Nothing runs before a
+system is checked against its FMUs.
 """
 
 import math
@@ -26,6 +27,7 @@ from rparm.fmi.model import Model, Value
 from rparm.interruption import temporary_folder
 from rparm.systems.structure import (
     ALONE,
+    WAYS,
     Component,
     Connection,
     Connector,
@@ -48,12 +50,12 @@ SCHEMAS = Path(fmpy.__file__).parent / "ssp" / "schema"
 STRUCTURE_SCHEMA = "SystemStructureDescription.xsd"
 VALUES_SCHEMA = "SystemStructureParameterValues.xsd"
 FMU_TYPE = "application/x-fmu-sharedlibrary"
-STEP_SIZE = (
-    "ssd:Annotations/ssc:Annotation[@type='com.opensimulationplatform']"
-    "/osp:Algorithm/osp:FixedStepAlgorithm/@baseStepSize"
-)
+OSP = "ssd:Annotations/ssc:Annotation[@type='com.opensimulationplatform']"
+STEP_SIZE = f"{OSP}/osp:Algorithm/osp:FixedStepAlgorithm/@baseStepSize"
+RATE = f"{OSP}/osp:StepSizeHint/@value"
+ORDER = "ssd:Annotations/ssc:Annotation[@type='rparm']/order/text()"
 VERSION, VERSION_1 = "1.0", r"1\."  # of SSP
-KINDS = {"System": "a system in the system", "SignalDictionaryReference": "a signal dictionary"}
+KINDS = {"SignalDictionaryReference": "a signal dictionary"}
 # of a system, with what to do
 IGNORED = {
     "ParameterBindings": "bind at components",
@@ -61,6 +63,9 @@ IGNORED = {
 }
 # of a variant, whose results are files of that name
 PLAIN_NAME = re.compile(r"\w[\w .+-]{0,99}")
+
+
+End = tuple[str, str]  # element, "" for the whole system, and connector
 
 
 @contextmanager
@@ -92,9 +97,14 @@ class SspReader:
         # Ecos reads one prefix, no sets in the structure, no connections to the system's own
         self.is_plain = True
         self.are_variants = False  # else all sets of a component apply, the last wins
-        self.own: dict[str, str] = {}  # kinds of the system's own connectors, by name
-        self.outside: list[str] = []  # inputs of components that these feed
         self.models: dict[str, Model] = {}  # of the components
+        self.rates: dict[str, float] = {}  # s, of those that have one
+        self.subsystems: list[str] = []
+        self._components: dict[str, Component] = {}
+        self._bound: dict[str, dict[str, dict[str, Parameter]]] = {}
+        self._kinds: dict[End, str] = {}  # of systems' own connectors
+        self._starts: dict[End, End] = {}  # what feeds these
+        self._fed: list[tuple[End, End]] = []  # inputs of components, and what feeds them
 
     def fail(self, file: str, message: str, node: etree._Element | None = None) -> NoReturn:
         line = f", line {node.sourceline}" if node is not None else ""
@@ -126,25 +136,11 @@ class SspReader:
         root = self.parse(STRUCTURE, STRUCTURE_SCHEMA)
         system = root.find("ssd:System", NAMESPACES)
         self.is_plain = root.prefix == "ssd"
-        elements = system.find("ssd:Elements", NAMESPACES)
-        for name, way_out in IGNORED.items():
-            node = system.find(f"ssd:{name}", NAMESPACES)
-            if node is not None:
-                self.fail(STRUCTURE, f"engines ignore {name} of the system; {way_out}", node)
-        components: dict[str, Component] = {}
-        bound: dict[str, dict[str, dict[str, Parameter]]] = {}
-        for node in elements if elements is not None else ():
-            component = self.component(node)
-            if component.name in components:
-                self.fail(STRUCTURE, f"component {component.name!r} is there twice", node)
-            components[component.name] = component
-            bound[component.name] = self.bindings(node, component.name)
+        self.level(system, "")
+        components = self._components
         if not components:
             self.fail(STRUCTURE, "the system has no components", system)
-        own = system.iterfind("ssd:Connectors/ssd:Connector", NAMESPACES)
-        self.own = {node.get("name"): node.get("kind") for node in own}
-        nodes = system.iterfind("ssd:Connections/ssd:Connection", NAMESPACES)
-        connections = map(self.connection, nodes)
+        connections, outside = self.connections()
         fmus = FmuReader(self.path)
         for component in components.values():
             file = self.folder / component.source
@@ -156,18 +152,62 @@ class SspReader:
         return System(
             name=system.get("name"),
             components=tuple(components.values()),
-            connections=tuple(filter(None, connections)),
-            outside=tuple(self.outside),
+            connections=connections,
+            outside=outside,
             start=start,
             stop=stop,
             step=step,
-            parameters=self.variants(bound),
+            parameters=self.variants(self._bound),
             descriptions=self.descriptions,
             notes=tuple(notes),
+            order=self.order(root),
+            rates=self.rates,
+            subsystems=tuple(self.subsystems),
         )
 
-    def component(self, node: etree._Element) -> Component:
-        name = node.get("name")
+    def level(self, system: etree._Element, begin: str) -> None:
+        """Read a system, whose elements' names begin so."""
+        for name, way_out in IGNORED.items():
+            node = system.find(f"ssd:{name}", NAMESPACES)
+            if node is not None:
+                self.fail(STRUCTURE, f"engines ignore {name} of the system; {way_out}", node)
+        own = begin.removesuffix(".")
+        for node in system.iterfind("ssd:Connectors/ssd:Connector", NAMESPACES):
+            self._kinds[own, node.get("name")] = node.get("kind")
+        for node in system.iterfind("ssd:Elements/*", NAMESPACES):
+            name = f"{begin}{node.get('name')}"
+            if name in self._components or name in self.subsystems:
+                self.fail(STRUCTURE, f"component {name!r} is there twice", node)
+            if etree.QName(node).localname == "System":
+                self.is_plain = False
+                self.subsystems.append(name)
+                self.level(node, f"{name}.")
+                continue
+            self._components[name] = self.component(node, name)
+            self._bound[name] = self.bindings(node, name)
+            for every in node.xpath(RATE, namespaces=NAMESPACES)[:1]:
+                self.rates[name] = self.rate(every, name, node)
+        for node in system.iterfind("ssd:Connections/ssd:Connection", NAMESPACES):
+            self.connection(node, begin)
+
+    def rate(self, text: str, name: str, node: etree._Element) -> float:
+        try:
+            every = float(text)
+        except ValueError:
+            every = math.nan
+        if not 0 < every < math.inf:
+            wrong = f"component {name!r}: StepSizeHint: expected more than 0 s, got {text!r}"
+            self.fail(STRUCTURE, wrong, node)
+        return every
+
+    def order(self, root: etree._Element) -> str:
+        """Return the order of steps, which only this project's SSPs have."""
+        found = root.xpath(f"ssd:DefaultExperiment/{ORDER}", namespaces=NAMESPACES)
+        if found and found[0] not in WAYS:
+            self.fail(STRUCTURE, f"order: expected one of {', '.join(WAYS)}, got {found[0]!r}")
+        return found[0] if found else "jacobi"
+
+    def component(self, node: etree._Element, name: str) -> Component:
         kind = KINDS.get(etree.QName(node).localname) or node.get("type", FMU_TYPE)
         if kind != FMU_TYPE:
             self.fail(STRUCTURE, f"element {name!r} is {kind}, expected an FMU", node)
@@ -191,28 +231,54 @@ class SspReader:
             where = f"component {component!r}: {source!r} is no path in the SSP"
             self.fail(STRUCTURE, f"{where}: {wrong}", node)
 
-    def connection(self, node: etree._Element) -> Connection | None:
-        """Return a connection; None for the system's own connectors, which nothing is behind."""
-        ends = ("startElement", "startConnector", "endElement", "endConnector")
-        connection = Connection(*(node.get(name, "") for name in ends))
+    def connection(self, node: etree._Element, begin: str) -> None:
+        """Note a connection between elements and the system's own connectors."""
+        ends = []
+        for side in ("start", "end"):
+            element, connector = node.get(f"{side}Element", ""), node.get(f"{side}Connector", "")
+            name = f"{begin}{element}" if element else begin.removesuffix(".")
+            ends.append((name, connector))
+        start, end = ends
         for child in node:
             if etree.QName(child).namespace == NAMESPACES["ssc"]:
                 name = etree.QName(child).localname
-                self.fail(STRUCTURE, f"connection {connection}: {name} is not supported", node)
-        if connection.start_component and connection.end_component:
-            return connection
-        name, kind = connection.end_connector, "output"
-        if not connection.start_component:
-            name, kind = connection.start_connector, "input"
-        if self.own.get(name) != kind:
-            where = f"connection {connection}: the system"
-            self.fail(
-                STRUCTURE, f"{where} has no {kind} {name!r}{did_you_mean(name, self.own)}", node
+                where = f"connection {'.'.join(start)} -> {'.'.join(end)}"
+                self.fail(STRUCTURE, f"{where}: {name} is not supported", node)
+        for (element, connector), side in ((start, "start"), (end, "end")):
+            is_own = element == begin.removesuffix(".") and not node.get(f"{side}Element")
+            kind = (
+                ("input" if side == "start" else "output")
+                if is_own
+                else ("output" if side == "start" else "input")
             )
-        if kind == "input":
-            self.outside.append(connection.end)
-        self.is_plain = False
-        return None
+            if element in self._components or self._kinds.get((element, connector)) == kind:
+                continue
+            if not is_own and element not in self.subsystems:
+                continue  # no such component: `check` names it
+            known = [name for owner, name in self._kinds if owner == element]
+            whose = f"system {element!r}" if element else "the system"
+            where = f"connection {'.'.join(start)} -> {'.'.join(end)}"
+            wrong = f"{whose} has no {kind} {connector!r}{did_you_mean(connector, known)}"
+            self.fail(STRUCTURE, f"{where}: {wrong}", node)
+        if not node.get("startElement") or not node.get("endElement"):
+            self.is_plain = False
+        if end not in self._kinds:
+            self._fed.append((end, start))
+        elif self._starts.setdefault(end, start) != start:
+            wrong = "the connector has a connection already"
+            self.fail(STRUCTURE, f"connection {'.'.join(start)} -> {'.'.join(end)}: {wrong}", node)
+
+    def connections(self) -> tuple[tuple[Connection, ...], tuple[str, ...]]:
+        """Return those of components, and inputs that only connectors of systems feed."""
+        found, outside = [], []
+        for end, start in self._fed:
+            for _ in self._starts:  # through connectors of systems, as many at most
+                start = self._starts.get(start, start)
+            if start in self._kinds:
+                outside.append(".".join(end))
+            else:
+                found.append(Connection(*start, *end))
+        return tuple(found), tuple(outside)
 
     def experiment(
         self, root: etree._Element, step: float | None

@@ -19,6 +19,7 @@ from rparm.fmi.fmu_file import describe
 from rparm.fmi.model import Value, Variable
 from rparm.interruption import temporary_folder
 from rparm.systems import loop_file
+from rparm.systems.levels import levels
 from rparm.systems.python_component import ANY
 from rparm.systems.ssp import FMU_TYPE, NAMESPACES, STRUCTURE
 from rparm.systems.structure import ALONE, SETTABLE, OpenedSystem
@@ -31,14 +32,14 @@ UNIX = 3
 Sets = Mapping[str, Mapping[str, Mapping[str, Value]]]  # by variant, component and variable
 
 
-def write(path: Path, opened: OpenedSystem) -> dict[str, str]:
+def write(path: Path, opened: OpenedSystem, flat: bool = False) -> dict[str, str]:
     """Write a system with its FMUs and variants; inputs that move become inputs of the system.
 
-    Return what components in Python need to run. Without these the bytes depend only on the
-    contents.
+    Subsystems are systems within, unless it is to be `flat`. Return what components in Python need
+    to run. Without these the bytes depend only on the contents.
     """
     with temporary_folder() as folder:
-        writer = _Writer(opened, folder)
+        writer = _Writer(opened, folder, flat)
         files = writer.files()
     with whole(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for name, content in sorted(files.items()):
@@ -52,8 +53,8 @@ def write(path: Path, opened: OpenedSystem) -> dict[str, str]:
 
 
 class _Writer:
-    def __init__(self, opened: OpenedSystem, folder: Path) -> None:
-        self.system = opened.system
+    def __init__(self, opened: OpenedSystem, folder: Path, flat: bool) -> None:
+        self.system, self.flat = opened.system, flat
         self.inputs = [(name, *opened.split(name)) for name in self.system.inputs]
         self.needed: dict[str, str] = {}  # by components in Python, whose FMUs go into the folder
         self.fmus: dict[str, Path] = {}
@@ -123,15 +124,18 @@ class _Writer:
 
     def structure(self) -> str:
         system = self.system
-        ends = [(c.start_component, c.start_connector, c.end_component, c.end_connector)
-                for c in system.connections]  # fmt: skip
         shown = [self.variable(c.name, name) for c in system.components for name in c.connectors]
         times = {name: _text(getattr(system, name)) for name in ("start", "stop", "step")}
         return rendered(
-            "system.ssd", system=system, inputs=self.inputs, writer=self, spaces=NAMESPACES,
-            connections=[*ends, *(("", *entry) for entry in self.inputs)],
+            "system.ssd", system=system, whole=levels(system, self.inputs, self.flat),
+            writer=self, spaces=NAMESPACES,
             units=self.used(shown), typed=TYPED, fmu_type=FMU_TYPE, **times,
         )  # fmt: skip
+
+    def rate(self, component: str) -> str:
+        """Return the time between steps of a component that has its own, else nothing."""
+        every = self.system.rates.get(component)
+        return "" if every is None else _text(every)
 
     def bound(self, component: str) -> list[str]:
         """Return the files with the sets of a component; the first one is bound last, too."""

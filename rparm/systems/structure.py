@@ -126,6 +126,7 @@ class System:
     description: str = ""
     order: str = "jacobi"  # of steps, one of WAYS
     rates: Mapping[str, float] = field(default_factory=dict)  # s, of components with their own
+    subsystems: tuple[str, ...] = ()  # names before those of components, each before those in it
 
     def with_step(self, step: float) -> "System":
         """Return the system with another communication step, s; its rates change as much."""

@@ -117,6 +117,9 @@ static enum status assign(const struct call *call, int number, const struct even
         const struct assignment *own = &model->assignment[i];
         call->room.assigned[i] = *(double *)(void *)((char *)call->values + own->offset);
     }
+    int *counts = call->segments + model->segment_count;
+    const size_t counts_size = (size_t)model->count_count * sizeof *counts;
+    memcpy(call->room.counted, counts, counts_size);
     if (number >= 0) {
         model->change(call->values, call->t, relations_later(call->t, call->error), number,
                       call->room.tolerance);
@@ -132,7 +135,11 @@ static enum status assign(const struct call *call, int number, const struct even
         const struct assignment *own = &model->assignment[i];
         *(double *)(void *)((char *)call->values + own->offset) = call->room.assigned[i];
     }
-    return refused != NULL ? refuse(call, event, refused) : check_counts(call, event);
+    if (refused == NULL) {
+        return check_counts(call, event);
+    }
+    memcpy(counts, call->room.counted, counts_size);
+    return refuse(call, event, refused);
 }
 
 /* Sets the tolerance of states that have jumped: 0, or a few roundings of what was assigned.

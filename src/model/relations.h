@@ -121,6 +121,7 @@ struct relations_room {
     int *turned;                        /* one per relation; zeros */
     double *tolerance;                  /* one per state */
     double *assigned;                   /* one per assignment */
+    int *counted;                       /* one per count */
     const double *zeros;                /* one per state and input */
 };
 

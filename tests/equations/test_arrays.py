@@ -8,6 +8,8 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from scipy.linalg import expm
 
+import rparm
+from rparm.errors import UserError
 from tests.equations.compiled import c_model, read_text
 from tests.equations.examples import METHODS, MODELS, initializing, made, simulated
 
@@ -192,6 +194,49 @@ def test_numbers_of_other_units_are_declared_in_si() -> None:
     (rpm,) = (display for display in units["rad/s"] if display.name == "rpm")
     assert 2 * np.pi * rpm.factor == pytest.approx(60.0, rel=1e-15)
     assert [*map(str, units["m"])] and [d.name for d in units["m"]] == ["mm"]
+
+
+@pytest.mark.parametrize("version", ["", "fmi3"])
+@EACH_METHOD
+def test_right_sides_of_a_whole_array_see_the_values_before(method: int, version: str) -> None:
+    """A line of exponentials, which a sampler shifts by one; a matrix that an event turns."""
+    fmu = made(TEXTS["LINE"])
+    start = {"solver_method": method}
+    run = simulated(fmu.parent / version / fmu.name, 3.0, 0.1, start, relative_tolerance=1e-10)
+    rates, expected = -np.arange(6) / 10, np.arange(6.0) * np.exp(-np.arange(6) / 20)
+    for span in (1.0, 1.0, 0.5):
+        expected = np.roll(expected, 1) * np.exp(rates * span)
+    assert [run[f"x[{i}]"][-1] for i in range(6)] == pytest.approx(expected, rel=1e-8)
+    z = np.array([[run[f"z[{i},{j}]"] for j in (1, 2, 3)] for i in (1, 2)])
+    assert np.array_equal(z[..., 0], [[1, 2, 3], [4, 5, 6]])
+    assert np.array_equal(z[..., -1], [[6, 5, 4], [3, 2, 1]])
+
+
+@pytest.mark.parametrize("version", ["", "fmi3"])
+def test_a_unit_with_halves_has_no_base_unit(version: str) -> None:
+    """FMI has no fraction there. What users write is converted as any other unit."""
+    fmu = made(TEXTS["VALVE"])
+    fmu = fmu.parent / version / fmu.name
+    description = fmpy.read_model_description(fmu)
+    units = {unit.name: unit for unit in description.unitDefinitions}
+    halves = ["V/Hz0.5", "flow_per_root", "kg0.5/(m0.5.s)", "m3/(s.Pa0.5)"]
+    assert sorted(name for name, unit in units.items() if unit.baseUnit is None) == halves
+    (kv,) = units["m3/(s.Pa0.5)"].displayUnits
+    assert (kv.name, kv.factor) == ("m3/(h.bar0.5)", pytest.approx(3600 * 1e5**0.5, rel=1e-15))
+    for given, flow in (
+        ("5 m3/(h.bar0.5)", 5 * 5**0.5), ("20 l/(min.kPa0.5)", 1.2 * 500**0.5),
+        ("3 m³/(h·bar0.5)", 3 * 5**0.5), (2 / 3600 / 1e5**0.5, 2 * 5**0.5),
+    ):  # fmt: skip
+        start = {"Kv": given, "drop": "5 bar", "density": "7 nV/Hz0.5"}
+        run = rparm.simulate(
+            fmu, stop_time=7200.0, step=3600.0, start_values=start, outputs=["h", "q", "again", "V"]
+        )
+        assert run["q"] == pytest.approx(flow / 3600, rel=1e-14)
+        assert run["again"] == pytest.approx(flow / 3600 * 2.5, rel=1e-14)
+        assert run["h"][-1] == pytest.approx(flow, rel=1e-9)
+        assert run["V"] == pytest.approx(7e-9 * 2000**0.5, rel=1e-14)
+    with pytest.raises(UserError, match="Kv: unknown unit 'm3/h'"):
+        rparm.simulate(fmu, stop_time=1.0, step=1.0, start_values={"Kv": "1 m3/h"})
 
 
 @pytest.mark.parametrize("version", ["", "fmi3"])

@@ -3,6 +3,7 @@
 Compiled models of them are compared with sympy.
 """
 
+import itertools
 import math
 import random
 import re
@@ -21,10 +22,10 @@ from tests.support.paths import ROOT
 from tests.support.tables import cases
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from compiler.graph.graph import Graph  # noqa: E402
+from compiler.graph.graph import Graph, Value  # noqa: E402
 from compiler.plain_c.interpreter import Interpreter  # noqa: E402
 from compiler.plain_c.text import CTextError, read  # noqa: E402
-from compiler.plain_c.values import Conditions  # noqa: E402
+from compiler.plain_c.values import Conditions, Known  # noqa: E402
 from compiler.read.header import made  # noqa: E402
 from compiler.write.guards import settled  # noqa: E402
 
@@ -123,6 +124,64 @@ def test_a_choice_that_the_block_around_it_has_made_is_gone() -> None:
     became = settled([value, other], Conditions(graph))
     assert became[value] is graph.value("if", both, graph.value("sin", square), zero)
     assert became[inner] is square and became[other] is other
+
+
+def holds(condition: Value, given: dict[Value, float]) -> bool:
+    """Return whether a condition holds; given: truths and whole numbers."""
+    if condition in given:
+        return bool(given[condition])
+    if condition.op == "not":
+        return not holds(condition.arguments[0], given)
+    if condition.op == "==":
+        return given[condition.arguments[0]] == condition.arguments[1].number
+    return {"and": all, "or": any}[condition.op](holds(c, given) for c in condition.arguments)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_known_holds_in_all_cases_that_are_left(seed: int) -> None:
+    """A part that a condition decides is known, and it is known where nothing is left."""
+    chance, graph = random.Random(seed), Graph(has_switches=False, is_guarded=False)
+    conditions = Conditions(graph)
+    leaf = conditions.leaf("m", (0, 1, 2)).leaf
+    x, numbers = graph.value("state", name="x"), [graph.number(float(i)) for i in range(3)]
+    free = [graph.value("<", x, number) for number in numbers]
+    made = [*free, *(graph.value("==", leaf, number) for number in numbers)]
+    conditions.learn(made)
+    for _ in range(12):
+        parts = [conditions.no(c) if chance.random() < 0.3 else c for c in chance.sample(made, 2)]
+        made.append(getattr(conditions, chance.choice(["both", "either"]))(*parts))
+    made = [condition for condition in made if condition.op != "number"]
+    cases = [
+        dict(zip([*free, leaf], case, strict=True))
+        for case in itertools.product([False, True], [False, True], [False, True], range(3))
+    ]
+    known, taken = Known(), cases
+    for condition in chance.choices(made, k=4):
+        truth = chance.random() < 0.7
+        left = [case for case in taken if holds(condition, case) is truth]
+        new = conditions.assume(condition, truth, known)
+        assert new is not None or not left
+        if new is not None and left:
+            known, taken = new, left
+            assert conditions.resolve(condition, known).number == truth
+        for other in made:
+            found = conditions.resolve(other, known)
+            assert found is other or {holds(other, case) for case in taken} == {found.number != 0.0}
+
+
+def test_shared_parts_of_conditions_are_resolved_once() -> None:
+    graph, steps = Graph(has_switches=False, is_guarded=False), []
+    conditions = Conditions(graph, lambda: steps.append(1))
+    x = graph.value("state", name="x")
+    chain = graph.value("<", x, graph.number(0.0))
+    for i in range(1, 60):
+        first, second = (graph.value(op, x, graph.number(float(i))) for op in "<>")
+        again = graph.value("and", graph.value("not", chain), second)
+        chain = graph.value("or", graph.value("and", chain, first), again)
+    known = conditions.assume(chain, True, Known())
+    assert conditions.resolve(chain, known) is conditions.true
+    assert conditions.resolve(again, known) is again
+    assert len(steps) < 60 * 20
 
 
 # ---- Derivatives ---------------------------------------------------------------------------------

@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
+import rparm
 from rparm import api
+from rparm.errors import UserError
 from tests.equations.compiled import declared, read
 from tests.equations.examples import METHODS, MODELS, initializing, loaded, made, simulated
 from tests.support.instances import Instance
 
 TEXTS = MODELS["kinds"]
-DELAY, EITHER, GEAR, NOISE, TIMES = (
-    TEXTS[name] for name in ("DELAY", "EITHER", "GEAR", "NOISE", "TIMES")
+CALLS, DELAY, EITHER, GEAR, NOISE, TIMES = (
+    TEXTS[name] for name in ("CALLS", "DELAY", "EITHER", "GEAR", "NOISE", "TIMES")
 )
 STATE = """name = "Checked"
 [parameters]
@@ -250,6 +252,30 @@ def test_an_index_out_of_range_is_named() -> None:
             unit.get("late")
         said = "late: d[delay] [index of d: 0..4] is not finite at t = 0 with delay = 5"
         assert unit.messages[-1].text == said
+
+
+@pytest.mark.parametrize("version", ["", "fmi3"])
+@pytest.mark.parametrize(
+    ("derivative", "new", "value", "said"),
+    [
+        ("0", "0", "call[target]", "y: call[target] [index of call: 1..3]"),
+        ("0", "0", "x[4 - target]", "y: x[4 - target] [index of x: 1..3]"),
+        ("0", "0", "m[2, target]", "y: m[2,target] [index of m: 2,1..2,3]"),
+        ("call[target]", "0", "0", "derivative of x[1]: call[target] [index of call: 1..3]"),
+        ("0", "call[target]", "0", "sampler s: held = call[target] [index of call: 1..3]"),
+    ],
+)  # fmt: skip
+def test_a_target_out_of_range_is_named(
+    derivative: str, new: str, value: str, said: str, version: str
+) -> None:
+    """With its value when it is read, although the sampler sets it."""
+    text = CALLS.replace("DERIVATIVE", derivative).replace("NEW", new).replace("VALUE", value)
+    fmu = made(text)
+    with pytest.raises(UserError) as error:
+        rparm.simulate(fmu.parent / version / fmu.name, stop_time=1.0, step=0.05, outputs=["y"])
+    message = str(error.value)
+    assert f"{said} is not finite" in message and message.endswith("with target = 4")
+    assert "\n" not in message
 
 
 def test_what_is_not_shown_is_no_variable() -> None:

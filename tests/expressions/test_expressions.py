@@ -1,11 +1,19 @@
 """Expressions: against Python's own arithmetic, and what is refused."""
 
+import decimal
 import math
 import random
+from fractions import Fraction
 
 import pytest
 from rparm.fmu_tools.compiler import units
-from rparm.fmu_tools.compiler.expressions.dimensions import ONE, dimension_of, of_exponents, shown
+from rparm.fmu_tools.compiler.expressions.dimensions import (
+    ANY,
+    ONE,
+    dimension_of,
+    of_exponents,
+    shown,
+)
 from rparm.fmu_tools.compiler.expressions.expression import (
     FUNCTIONS,
     ExpressionError,
@@ -134,11 +142,14 @@ UNITS = {
         ("2**phi", "1"),
         ("1 / (m * time)", "1/(kg.s)"),
         ("l**0.5 * sqrt(l)", "m"),
+        ("sqrt(m) * l**1.5 / sqrt(time)", "kg0.5.m1.5/s0.5"),
+        ("omega * sqrt(1[V/Hz0.5] / 1[V]) * time**0.75", "1"),
         ("sin(2[rad/s] * time) * 3[mm]", "m"),
         ("tanh(omega / 0.5[rpm])", "1"),
         ("mod(time, 86400)", "s"),
         ("mod(time, -24 * 3600)", "s"),
         ("mod(l, 20[cm])", "m"),
+        ("l**2[1] + l**-2[1] * l**4", "m2"),
     ],
 )
 def test_units(text: str, unit: str) -> None:
@@ -162,6 +173,43 @@ def test_units(text: str, unit: str) -> None:
 def test_units_that_do_not_fit(text: str, column: int) -> None:
     with pytest.raises(ExpressionError, match=f"^column {column}: "):
         dimension_of(parse(f"{text}"), UNITS, expected=UNITS["time"])
+
+
+@pytest.mark.parametrize(
+    ("text", "fits"),
+    [
+        ("2[kg] + 1[mm]", False), ("x + 2[kg] + 1[mm]", False), ("x * 2[kg] + 1[mm]", True),
+        ("2[kg] if x > 0 else 1[m]", False), ("min(x, 2[kg], y) < 3[s]", False),
+        ("sin(2[rad/s] * time) + x**2[m] + 1[J]", True), ("sin(2[m]) + x", False),
+        ("sqrt(x) + 2[kg] - time", True), ("pi * 2[kg] + 1[m]", False),
+    ],
+)  # fmt: skip
+def test_numbers_fit_each_other_among_names_of_any_unit(text: str, fits: bool) -> None:
+    units = dict.fromkeys(("x", "y", "time"), ANY)
+    if fits:
+        dimension_of(parse(text), units)
+    else:
+        with pytest.raises(ExpressionError):
+            dimension_of(parse(text), units)
+
+
+def test_a_wrong_form_is_answered_by_the_right_one() -> None:
+    for text in ("any(x > 3)", "any(i = 1..3)", "any(x[i] > 3, i = 1..3)", "any(i in 1..3, x > 1)"):
+        with pytest.raises(
+            ExpressionError, match=r": over a range it is any\(i = 1..n, x\[i] > 0\)$"
+        ):
+            parse(text)
+    for text in ("min(x)", "min(i = 1..3)", "min(x[i], i = 1..3)", "min(1..3, x[i])"):
+        with pytest.raises(ExpressionError, match=r": over a range it is min\(i = 1..n, x\[i]\)$"):
+            parse(text)
+    for text in ("2[rad]s", "2[rad] x", "2[m][s]", "2[rad](x)"):
+        with pytest.raises(ExpressionError, match="behind a unit: write all of the unit between"):
+            parse(text)
+    for text in ("sin(x)[rad]", "(x)[m]"):
+        with pytest.raises(
+            ExpressionError, match=r"'\[': only numbers have units, as in 2\[rad/s]"
+        ):
+            parse(text)
 
 
 def test_indexes_keep_units() -> None:
@@ -209,8 +257,28 @@ def test_a_unit_is_a_product_of_symbols() -> None:
     assert units.parsed("N.m.s/rad").exponents == {"kg": 1, "m": 2, "s": -1, "rad": -1}
     assert units.parsed("V/(A.s)").exponents == {"kg": 1, "m": 2, "s": -4, "A": -2}
     assert units.parsed("1").exponents == {}
-    for text in ("", "kg m", "m/s/s", "x", "m^2", "2", "1.m", "(m)", "m10"):
+    for text in ("", "kg m", "m/s/s", "x", "m^2", "2", "1.m", "(m)", "m10", "m0", "m0.0", "m.5"):
         with pytest.raises(ValueError):
+            units.parsed(text)
+
+
+def test_exponents_may_be_halves() -> None:
+    """Their factors are the nearest doubles: exact where they are a fraction."""
+    kv = units.parsed("m3/(s.kPa0.5)")
+    assert kv.exponents == {"m": 3.5, "kg": -0.5} and kv.base == "m3/(s.Pa0.5)"
+    assert units.parsed("V/Hz0.5").exponents == {"kg": 1, "m": 2, "s": -2.5, "A": -1}
+    assert units.parsed("cm0.5.m-0.5").factor == units.parsed("dm.m-1").factor
+    with decimal.localcontext(prec=60):
+        for text, square in (("kPa0.5", "1e3"), ("mm2.5", "1e-15"), ("1/bar1.5", "1e-15")):
+            root = decimal.Decimal(square).sqrt()
+            for number in ("1", "5", "0.3", "1e300", "7.123456789012345e-9"):
+                assert units.parsed(text).value(number) == float(decimal.Decimal(number) * root)
+    chance = random.Random(3)
+    for _ in range(200):
+        half = {base: Fraction(chance.choice([*range(-9, 0), *range(1, 10)]), 2) for base in "msA"}
+        assert units.parsed(units.shown(half)).exponents == half
+    for text in ("m0.3", "m1.50", "V/sqrt(Hz)", "V/Hz1/2", "m.5"):
+        with pytest.raises(ValueError, match=r"^unit .* whole or halves, as in Hz0.5, up to 9.5"):
             units.parsed(text)
 
 

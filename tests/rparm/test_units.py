@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rparm import units
 from rparm.errors import UserError, WrongValueError
 from rparm.fmi.model import Variable
 from rparm.runs import scenario
@@ -172,6 +173,12 @@ def test_a_scenario_takes_units_wherever_it_takes_values(tmp_path: Path) -> None
         path.write_text(text.format(stop=stop, force=force), encoding="utf-8")
         with pytest.raises(UserError, match=message):
             scenario.load(path, declared("rp_plant"))
+
+
+def test_pages_write_units_as_people_do() -> None:
+    given = {"kg.m2/s2": "kg·m²/s²", "m3/(s.Pa0.5)": "m³/(s·Pa0.5)", "m2.5.s3": "m2.5·s³", None: ""}
+    for text, shown in given.items():
+        assert units.unit(text) == shown
 
 
 def test_no_scenario_of_the_project_is_asked_about() -> None:

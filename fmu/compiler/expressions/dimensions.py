@@ -9,16 +9,19 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from .. import units as si
-from ..units import BASE
+from ..units import BASE, Exponents
 from .expression import EQUALITIES, RELATIONS, ExpressionError, Node, in_order
 from .parser import AS_SECOND, table_unit
 
 Dimension = tuple[Fraction, ...]  # exponents, in the order of BASE
+SUMS = ("+", "-", "min", "max", "hypot")
+SAME = (*SUMS, *RELATIONS, *EQUALITIES, "if", "element")  # of arguments with one unit
 LARGEST_ROOT = 100  # 0.3333333333333333 is 1/3
 ONE: Dimension = (Fraction(0),) * len(BASE)
+ANY: Dimension = ()  # of names in a file without units, and of what is made of them
 
 
-def of_exponents(exponents: Mapping[str, int]) -> Dimension:
+def of_exponents(exponents: Exponents) -> Dimension:
     """Return the dimension with these exponents, by base unit."""
     return tuple(Fraction(exponents.get(base, 0)) for base in BASE)
 
@@ -38,7 +41,8 @@ def dimension_of(
 ) -> Dimension:
     """Return the dimension of an expression of right kinds; 1 for a condition and for a number.
 
-    `units` has all names that are numbers, `time` too. ExpressionError where units do not fit.
+    `units` has all names that are numbers, `time` too; `ANY` fits everything. ExpressionError where
+    units do not fit.
     """
     found: dict[Node, Dimension | None] = {}  # None: a number, which takes any unit
     for node in in_order([root]):
@@ -58,12 +62,14 @@ def _dimension(
         return units.get(node.name, ONE)
     if node.op == "negative":
         return given[0]
+    if ANY in given and node.op not in SAME:
+        return ANY
     if node.op in ("*", "/"):
         power = Fraction(1 if node.op == "*" else -1)
         if given == [None, None]:
             return None
         return times(given[0] or ONE, given[1] or ONE, power)
-    if node.op in ("+", "-", "min", "max", "hypot"):
+    if node.op in SUMS:
         return _same(node, given)
     if node.op in ("table", "call"):
         return _of_table(node, given, units)
@@ -108,18 +114,18 @@ def _of_table(
 
 def _checked(node: Node, unit: Dimension | None, expected: Dimension, hint: str = "") -> Dimension:
     """Return the unit that is expected, for a table or function that the node names."""
-    if unit not in (None, expected):
+    if ANY not in (unit, expected) and unit not in (None, expected):
         what = f"{node.name.partition('(')[0]} takes unit {shown(expected)}, got {shown(unit)}"
         raise ExpressionError(node.column, what + hint)
     return expected
 
 
 def _same(node: Node, given: list[Dimension | None]) -> Dimension | None:
-    known = [unit for unit in given if unit is not None]
+    known = [unit for unit in given if unit not in (None, ANY)]
     if len(set(known)) > 1:
         units = " and ".join(shown(unit) for unit in known)
         raise ExpressionError(node.column, f"{node.op!r}: units {units} do not fit")
-    return known[0] if known else None
+    return known[0] if known else ANY if ANY in given else None
 
 
 def _power(node: Node, given: list[Dimension | None]) -> Dimension | None:
@@ -136,8 +142,8 @@ def _power(node: Node, given: list[Dimension | None]) -> Dimension | None:
 
 
 def _literal(node: Node) -> Fraction | None:
-    """Return a number that stands in the text, perhaps with a sign."""
+    """Return a number that stands in the text, perhaps with a sign or a unit."""
     sign = 1
-    while node.op == "negative":
-        node, sign = node.arguments[0], -sign
+    while node.op in ("negative", "unit"):
+        node, sign = node.arguments[0], -sign if node.op == "negative" else sign
     return sign * Fraction(node.value) if node.op == "number" else None

@@ -7,6 +7,7 @@ import math
 import operator
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from operator import attrgetter
 from typing import Any, TypeVar
 
@@ -97,7 +98,7 @@ class Node:
     name: str = ""
     body: "Node | None" = None
     function: str = ""
-    of: tuple[tuple[int, ...], ...] = ()
+    of: tuple[tuple[int | Fraction, ...], ...] = ()
 
 
 def in_order(

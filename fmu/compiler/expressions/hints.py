@@ -10,7 +10,9 @@ HERE += " clip=min(max(x,a),b) step=A_if_C_else_B heaviside=A_if_C_else_B int=fl
 HERE += " fix=floor fmod=mod rem=mod derivative=der ddt=der diff=der"
 HERE += " arcsin=asin arccos=acos arctan=atan arctan2=atan2"
 INSTEAD = dict(pair.replace("_", " ").split("=") for pair in HERE.split())
+OF_NUMBERS = "only numbers have units, as in 2[rad/s]"
 SIGNS = {"^": "powers are written **", "?": "write A if C else B", "&": "write and"}
+SIGNS |= {":": "ranges are written 1..n", ";": "write , between arguments"}
 SIGNS |= {"|": "write or", "!": "write not", "%": "write mod(x, y), which has the sign of y"}
 SIGNS |= dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "no minus sign of ASCII, write -")
 # of those that differ

@@ -1,11 +1,12 @@
 """Indexes in expressions: elements of arrays, sums and the like, conditions on indexes."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import reduce
 
+from ..units import parsed
 from .expression import (
     MOST_OPERATIONS,
     OPERATIONS,
@@ -17,7 +18,9 @@ from .expression import (
     evaluated,
     in_order,
     names,
+    written,
 )
+from .hints import OF_NUMBERS
 
 # operations over a range -> those of two terms, and their value without any
 TERMS: dict[str, tuple[str, float | bool | None]] = {
@@ -64,10 +67,14 @@ def with_elements(root: Node, elements: Mapping[str, Collection[tuple[int, ...]]
         arguments = tuple(found[argument] for argument in node.arguments)
         new = node if arguments == node.arguments else replace(node, arguments=arguments)
         if node.op == "element":
-            base, numbers = node.name.partition("[")[0], [*map(_number_of, arguments)]
+            base = node.name.partition("[")[0]
+            if base not in elements:
+                text = f"there is no array {base}{_hint(arguments)}"
+                raise ExpressionError(node.column, text)
+            numbers = [*map(_number_of, arguments)]
             of = [
                 at
-                for at in elements.get(base, ())
+                for at in elements[base]
                 if len(at) == len(numbers)
                 and all(n in (None, i) for n, i in zip(numbers, at, strict=True))
             ]
@@ -78,6 +85,14 @@ def with_elements(root: Node, elements: Mapping[str, Collection[tuple[int, ...]]
             new = replace(node, arguments=arguments + own, of=tuple(of))
         found[node] = new
     return found[root]
+
+
+def _hint(indexes: Iterable[Node]) -> str:
+    """Say what has a unit, if these indexes are one."""
+    with suppress(ValueError):
+        parsed(",".join(map(written, indexes)).replace(" ", ""))
+        return f": {OF_NUMBERS}"
+    return ""
 
 
 def _number_of(index: Node) -> int | None:

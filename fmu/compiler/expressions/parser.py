@@ -34,7 +34,7 @@ from .expression import (
     names,
     with_names,
 )
-from .hints import SIGNS, meant
+from .hints import OF_NUMBERS, SIGNS, meant
 from .indexes import Range, at_indexes
 from .kinds import with_kinds
 
@@ -53,6 +53,7 @@ TOKEN = re.compile(
     r"|(?P<operator>\*\*|[<>=!]=|\.\.|[-+*/<>(),\[\]=])"
 )
 LONGEST = 1000  # characters
+TERM = {"any": "x[i] > 0", "all": "x[i] > 0"}  # in examples; otherwise x[i]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +92,11 @@ class Function:
         known = dict(zip(self.arguments, given, strict=True))
         found = with_names(self.body, known, column, self.function)
         return replace(found, name=UNIT_ONE) if self.has_unit_one else found
+
+
+def form_over_range(name: str) -> str:
+    """Write how a function over a range is called, behind a message."""
+    return f": over a range it is {name}(i = 1..n, {TERM.get(name, 'x[i]')})"
 
 
 def table_unit(name: str, argument: int | str = "") -> str:
@@ -177,6 +183,7 @@ class _Parser:
         self._tokens, self._at = _tokens(text), 0
         self._depth = 0
         self._operations = 0  # that functions stand for
+        self._form = ""  # of what is read, in messages
 
     @property
     def token(self) -> Token:
@@ -189,7 +196,10 @@ class _Parser:
         return token
 
     def unexpected(self, expected: str) -> ExpressionError:
-        return ExpressionError(self.token.column, f"expected {expected}, got {self.token.shown}")
+        text = f"expected {expected}, got {self.token.shown}{self._form}"
+        if self.token.text == "[" and not self._form:
+            text += f": {OF_NUMBERS}, and several indexes are x[i, j]"
+        return ExpressionError(self.token.column, text)
 
     def expect(self, text: str) -> None:
         if self.token.text != text or self.token.kind != "operator":
@@ -267,7 +277,8 @@ class _Parser:
         """Parse "i = 1..n"."""
         token = self.take()
         if token.kind != "name" or token.text in NO_NAMES or "." in token.text:
-            raise ExpressionError(token.column, f"expected an index such as i, got {token.shown}")
+            text = f"expected an index such as i, got {token.shown}{self._form}"
+            raise ExpressionError(token.column, text)
         self.expect("=")
         first = self.expression(CONDITIONAL)
         self.expect("..")
@@ -284,8 +295,10 @@ class _Parser:
         """Parse the range and the terms of a sum, of the least of several, ..."""
         name, column = function.text, function.column
         self.take()
+        self._form = form_over_range(name)
         over = self.range()
         self.expect(",")
+        self._form = ""
         body = self.expression(CONDITIONAL)
         if self.token.text in ("=", ","):
             raise self.unexpected(f"')', as in {name}(i = 1..n, {name}(j = 1..m, ...))")
@@ -315,6 +328,9 @@ class _Parser:
         exponents = {base: unit.exponents.get(base, 0) for base in BASE}
         given = (Node("number", column, value=value),)
         of = (tuple(exponents.values()),)
+        if self.token.kind in ("name", "number") or self.token.text in ("(", "["):
+            text = "behind a unit: write all of the unit between the brackets, as in 2[rad/s]"
+            raise ExpressionError(self.token.column, f"{self.token.shown} {text}")
         return Node("unit", column, given, name=f"[{shown(exponents)}]", of=of)
 
     def below_zero(self) -> Node | None:
@@ -346,7 +362,10 @@ class _Parser:
                 break
             arguments.append(self.expression(CONDITIONAL))
             separator = ","
+        form = form_over_range(function.text) if function.text in OVER_RANGES else ""
+        self._form = form
         self.expect(")")
+        self._form = ""
         count = len(further.arguments) if further else FUNCTIONS[function.text]
         fewest = 2 if count is None else count - getattr(further, "optional", 0)
         if not fewest <= len(arguments) <= (count or len(arguments)):
@@ -354,7 +373,7 @@ class _Parser:
                 "2 or more" if count is None else " or ".join(map(str, sorted({fewest, count})))
             )
             wanted = f"{numbers} argument{'s' * (count != 1)}"
-            text = f"{function.text}: expected {wanted}, got {len(arguments)}"
+            text = f"{function.text}: expected {wanted}, got {len(arguments)}{form}"
             raise ExpressionError(function.column, text)
         if further:
             return self.expanded(further, arguments, function.column)

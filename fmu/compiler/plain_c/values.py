@@ -163,40 +163,61 @@ class Conditions:
         truth = self._truth(condition, known)
         return condition if truth is None else self.constant(truth)
 
-    def _truth(self, condition: Value, known: Known) -> bool | None:
+    def _truth(
+        self, condition: Value, known: Known, found: dict[Value, bool | None] | None = None
+    ) -> bool | None:
+        """Return whether a condition holds; `found`: what is known of others in this state."""
         self.spend()
+        truth = self._noted(condition, known)
+        is_compound = condition.op in ("not", "and", "or") and condition not in self.members
+        if truth is not None or not is_compound:
+            return truth
+        found = {} if found is None else found
+        if condition in found:
+            return found[condition]
+        parts = [self._truth(part, known, found) for part in condition.arguments]
+        decides = condition.op == "or"
+        if condition.op == "not":
+            truth = None if parts[0] is None else not parts[0]
+        elif decides in parts:
+            truth = decides
+        else:
+            truth = None if None in parts else not decides
+        found[condition] = truth
+        return truth
+
+    def _noted(self, condition: Value, known: Known) -> bool | None:
+        """Return whether a condition holds, if that is known without its parts."""
         if condition.op == "number":
             return condition.number != 0.0
         if condition in known.truths:
             return known.truths[condition]
-        if condition in self.members:
-            leaf, holds = self.members[condition]
-            possible = known.sets.get(leaf, self.domains[leaf])
-            if possible <= holds:
-                return True
-            return False if not possible & holds else None
-        if condition.op == "not":
-            inner = self._truth(condition.arguments[0], known)
-            return None if inner is None else not inner
-        if condition.op in ("and", "or"):
-            parts = [self._truth(part, known) for part in condition.arguments]
-            decides = condition.op == "or"
-            if decides in parts:
-                return decides
-            return None if None in parts else not decides
-        return None
+        if condition not in self.members:
+            return None
+        leaf, holds = self.members[condition]
+        possible = known.sets.get(leaf, self.domains[leaf])
+        if possible <= holds:
+            return True
+        return False if not possible & holds else None
 
     def assume(self, condition: Value, holds: bool, known: Known) -> Known | None:
         """Return the knowledge where the condition holds, or does not; None: nowhere."""
         found = Known(dict(known.truths), dict(known.sets), known.clauses)
-        return found if self._assume(condition, holds, found) else None
+        left: list[tuple[Value, bool]] | None = [(condition, holds)]
+        while left:
+            if not all(self._note(*each, found) for each in left):
+                return None
+            left = self._concluded(found)
+        return None if left is None else found
 
-    def _assume(self, condition: Value, holds: bool, known: Known) -> bool:
-        truth = self._truth(condition, known)
+    def _note(self, condition: Value, holds: bool, known: Known) -> bool:
+        """Note that a condition holds, or does not; return whether that may be."""
+        self.spend()
+        truth = self._noted(condition, known)
         if truth is not None:
             return truth is holds
         if condition.op == "not":
-            return self._assume(condition.arguments[0], not holds, known)
+            return self._note(condition.arguments[0], not holds, known)
         known.truths[condition] = holds
         if condition in self.members:
             leaf, inside = self.members[condition]
@@ -204,25 +225,29 @@ class Conditions:
             known.sets[leaf] = possible & inside if holds else possible - inside
         elif condition.op in ("and", "or"):
             if holds is (condition.op == "and"):
-                return all(self._assume(part, holds, known) for part in condition.arguments)
+                return all(self._note(part, holds, known) for part in condition.arguments)
             known.clauses += (condition,)
         elif condition.op == "==" and condition.arguments[0].op == "integer" and holds:
             known.sets[condition.arguments[0]] = frozenset([int(condition.arguments[1].number)])
-        return self._propagate(known)
-
-    def _propagate(self, known: Known) -> bool:
-        """Return conclude from alternatives: if all parts but one are known, that one is too."""
-        for clause in known.clauses:
-            open_parts = [p for p in clause.arguments if self._truth(p, known) is None]
-            decided = clause.op == "or"  # a part with this truth satisfies the clause
-            satisfied = any(self._truth(p, known) is decided for p in clause.arguments)
-            if satisfied or len(open_parts) > 1:
-                continue
-            if not open_parts:
-                return False
-            if not self._assume(open_parts[0], decided, known):
-                return False
         return True
+
+    def _concluded(self, known: Known) -> list[tuple[Value, bool]] | None:
+        """Return what follows from alternatives whose other parts are known; None: none is left."""
+        found: dict[Value, bool | None] = {}
+        follows, clauses = [], []
+        for clause in known.clauses:
+            decided = clause.op == "or"  # a part with this truth satisfies the clause
+            truths = [self._truth(part, known, found) for part in clause.arguments]
+            if decided in truths:
+                continue
+            clauses.append(clause)
+            left = [p for p, truth in zip(clause.arguments, truths, strict=True) if truth is None]
+            if not left:
+                return None
+            if len(left) == 1:
+                follows.append((left[0], decided))
+        known.clauses = tuple(clauses)
+        return follows
 
     # ---- Whole numbers ---------------------------------------------------------------------------
 

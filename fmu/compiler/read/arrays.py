@@ -35,23 +35,32 @@ def elements(file: ModelFile, key: str, entry: object) -> Iterator[Element]:
         yield Element(name, key if not at else f"{key} at {_shown(at)}", given, at)
 
 
-def _flat(starts: list[object], indexes: list[dict[str, int]]) -> list[object]:
+def _flat(
+    starts: list[object], indexes: list[dict[str, int]], place: str = "start"
+) -> list[object]:
     """Return one start value for each element; lists in the list are by the first index."""
     rows = [[*same] for _, same in groupby(indexes, lambda at: [*at.values()][:1])]
     is_nested = len(indexes[0]) > 1 and any(isinstance(start, list) for start in starts)
-    count = len(rows) if is_nested else len(indexes)
-    if len(starts) != count:
-        what = "lists, one for each first index" if is_nested else "values"
-        raise ModelFileError(f"start: expected {count} {what}, got {len(starts)}")
+    if len(starts) != (len(rows) if is_nested else len(indexes)):
+        same = len({*map(len, rows)}) == 1
+        lists = f" of {_values(rows[0])}" if same else ", one for each first index"
+        lists = f"{len(rows)} lists{lists}"
+        what = f"{_values(indexes)} or {lists}" if len(indexes[0]) > 1 else _values(indexes)
+        what = lists if is_nested else what
+        raise ModelFileError(f"{place}: expected {what}, got {len(starts)}")
     if not is_nested:
         return starts
     found = []
-    for start, row in zip(starts, rows, strict=True):
+    for number, (start, row) in enumerate(zip(starts, rows, strict=True), 1):
         if not isinstance(start, list):
-            raise ModelFileError(f"start: expected {count} lists or only values, got both")
+            raise ModelFileError(f"{place}: expected {len(rows)} lists or only values, got both")
         inner = [dict([*at.items()][1:]) for at in row]
-        found += _flat(start, inner)
+        found += _flat(start, inner, f"{place}: list {number}")
     return found
+
+
+def _values(of: list[dict[str, int]]) -> str:
+    return f"{len(of)} value{'s' * (len(of) != 1)}"
 
 
 def name_of(tree: Node, indexes: Mapping[str, int]) -> str:

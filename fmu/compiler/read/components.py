@@ -37,7 +37,7 @@ from .content import (
 from .keys import NAME, entries
 
 EQUATIONS = ".toml"
-LOOP = ("start", "step", "stop", "keep", "variants")  # keys that only loop files have
+LOOP = ("start", "step", "stop", "order", "keep", "variants")  # keys that only loop files have
 OF_LOOP = ("name", "description", "components", "connections", "inputs", "parameters", *LOOP)
 RUN = (".fmu", ".ssp", ".py")  # files that only `system` takes
 MOST_LEVELS = 20

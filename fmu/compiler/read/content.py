@@ -16,7 +16,7 @@ from ..expressions.kinds import CONDITION, NUMBER, Kind
 from ..expressions.parser import RANDOM_FUNCTIONS, Function, Lookup, parse
 from ..graph.tables import LookupTable
 from ..interface import Terminal
-from ..units import Unit, parsed
+from ..units import Exponents, Unit, parsed
 from .code import CodeFile
 
 FOLLOWS = "calculated"  # section of parameters that follow from others
@@ -91,7 +91,7 @@ class Variable:
     nominal: float | None = None
     kind: Kind = NUMBER
     unit: str = ""  # of SI, if the file has a name for it
-    exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
+    exponents: Exponents = field(default_factory=dict)
     display: tuple[str, float, float] | None = None  # unit in the file, with factor and offset
     description: str = ""
     derivative_of: str = ""  # the state of which the FMU has it as the derivative
@@ -231,7 +231,7 @@ class ModelFile:
     header: Any = None  # of its struct of values, if it has C
     hook: Hook | None = None
     sources: list[Path] = field(default_factory=list)  # the files of equations, included ones first
-    table_units: dict[str, dict[str, int]] = field(default_factory=dict)  # by `table_unit`
+    table_units: dict[str, Exponents] = field(default_factory=dict)  # by `table_unit`
     dimensions: dict[str, int] = field(default_factory=dict)  # numbers of indexes, by name
     indexes: set[str] = field(default_factory=set)  # all that `for` gives
     parsed: dict[str, Node] = field(default_factory=dict)  # texts, before their indexes
@@ -272,7 +272,10 @@ class ModelFile:
             always = [tree]  # calculated in any case; a branch need not have a value
             for node in always:
                 always += node.arguments[:1] if node.op == "if" else node.arguments
-                if node.op == "/" and (by := node.arguments[1]).op == "number" and by.value == 0:
+                by = node.arguments[1] if node.op == "/" else node
+                while by.op in ("unit", "negative"):
+                    by = by.arguments[0]
+                if node.op == "/" and by.op == "number" and by.value == 0:
                     at = ", ".join(f"{i} = {value}" for i, value in element.indexes.items())
                     raise ExpressionError(node.column, f"division by 0{at and f' at {at}'}")
             if self.operations > MOST_OPERATIONS:

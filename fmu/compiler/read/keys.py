@@ -5,12 +5,13 @@ Every mistake is a ModelFileError or a ValueError, in one line.
 
 import re
 from collections.abc import Callable, Collection, Iterable
+from fractions import Fraction
 from typing import Any
 
 from ..expressions.expression import FUNCTIONS, finite_number
 from ..expressions.kinds import CONDITION, WHOLE, Kind
 from ..expressions.parser import FURTHER, NO_NAMES
-from ..units import ANGLE, BASE
+from ..units import ANGLE, BASE, whole
 from .content import (
     ALGEBRAIC,
     BOOLEAN,
@@ -141,6 +142,12 @@ def _unit(value: object) -> str:
     return unit
 
 
+def _exponent(value: object) -> int | Fraction:
+    if type(value) not in (int, float) or not abs(value) < 100 or (2 * value) % 1:
+        raise ValueError("expected an exponent that is whole or a half")
+    return whole(Fraction(value))
+
+
 TEXT = _expect(
     f"a text of at most {LONGEST_TEXT} characters", str, lambda text: len(text) <= LONGEST_TEXT
 )
@@ -215,7 +222,7 @@ READ = {
     "terminate": _end,
     "unit": _unit,
     **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
-    **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
+    **dict.fromkeys((*BASE, ANGLE), _exponent),
     "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
     "modes": _modes,
     "arguments": _arguments,

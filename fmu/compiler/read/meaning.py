@@ -17,7 +17,8 @@ from ..expressions.expression import (
 from ..expressions.hints import meant
 from ..expressions.indexes import with_elements
 from ..expressions.kinds import CONDITION, kind_of, with_kinds
-from ..units import BASE
+from ..expressions.parser import table_unit
+from ..units import BASE, Exponents, whole
 from .blocks import block, groups
 from .content import (
     ALGEBRAIC,
@@ -48,6 +49,8 @@ def check(file: ModelFile) -> None:
     _check_periods(file)
     if file.has_units:
         _check_units(file)
+    else:
+        _check_numbers(file)
 
 
 def _add_elements(file: ModelFile) -> None:
@@ -131,6 +134,8 @@ def _hint(name: str, allowed: Collection[str], file: ModelFile) -> str:
     count = file.dimensions.get(base, 0)
     if name in file.functions:
         return f", a function or table: write {name}(...)"
+    if bracket and base in allowed:
+        return f": {base} is no array"
     if count and not bracket:
         return f", expected {base}[{', '.join('ijklmn'[:count])}]"
     if count:
@@ -243,7 +248,23 @@ def _check_units(file: ModelFile) -> None:
         if variable.expression.is_checked:
             continue
         with placed("[where]", variable.name):
-            variable.exponents = _whole(units[variable.name] or dimensions.ONE)
+            variable.exponents = _exponents(units[variable.name] or dimensions.ONE)
+
+
+def _check_numbers(file: ModelFile) -> None:
+    """Check the units of numbers among themselves, in a file without others."""
+    functions = [
+        table_unit(name, argument)
+        for name, function in file.functions.items()
+        for argument in ("", *range(len(function.arguments)))
+    ]
+    rates = [derivative_of(state.name) for state in file.of("states")]
+    units = dict.fromkeys([*file.variables, *rates, "time", *functions], dimensions.ANY)
+    units |= {key: of_exponents(found) for key, found in file.table_units.items()}
+    for expression in file.order:
+        if not expression.is_checked:
+            with placed(*expression.place):
+                dimension_of(expression.tree, units)
 
 
 def _without(
@@ -268,10 +289,8 @@ def _add_units(file: ModelFile, block: Block, units: dict[str, Dimension | None]
             units[name] = dimension_of(expression.tree, units)
 
 
-def _whole(unit: Dimension) -> dict[str, int]:
-    if any(exponent.denominator > 1 for exponent in unit):
-        shown_unit = dimensions.shown(unit)
-        raise ModelFileError(
-            f"has unit {shown_unit}, whose exponents are no whole numbers: use its square"
-        )
-    return {base: int(exponent) for base, exponent in zip(BASE, unit, strict=True)}
+def _exponents(unit: Dimension) -> Exponents:
+    if any(exponent.denominator > 2 for exponent in unit):
+        text = f"has unit {dimensions.shown(unit)}, whose exponents are neither whole nor halves"
+        raise ModelFileError(f"{text}: use a power of it")
+    return {base: whole(exponent) for base, exponent in zip(BASE, unit, strict=True)}

@@ -17,6 +17,7 @@ from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
 from ..plain_c.values import Conditions
 from ..read.content import CALCULATED, COUNTS, SWITCHES, Change, ModelFile, Sampler
+from ..units import Exponents
 from . import c_undefined
 from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
@@ -83,7 +84,7 @@ class Tick:
     name: str
     field: Field
     value: Value
-    exponents: dict[str, int]  # of its unit
+    exponents: Exponents  # of its unit
     description: str  # rparm/linearization/sampling.py knows it by that
 
 

@@ -26,7 +26,7 @@ from ..read.content import (
     placed,
 )
 from ..read.keys import NUMBERS
-from ..units import ANGLE, BASE, STANDARD, parsed, shown
+from ..units import ANGLE, BASE, STANDARD, Exponents, parsed, shown
 from . import c_events, c_hook, c_model, lock
 from .lock import Key
 
@@ -138,7 +138,7 @@ def _parts_of_instance(file: ModelFile, has_events: bool) -> Iterator[str]:
         yield "time_event"
 
 
-def of_instance(name: str, units: dict[str, dict[str, int]]) -> dict[str, interface.Variable]:
+def of_instance(name: str, units: dict[str, Exponents]) -> dict[str, interface.Variable]:
     """Return the variables of a file of src/instance."""
     found = _variables(by_hand.of_instance(name), lock.of_instance(), units)
     return {
@@ -152,7 +152,7 @@ def of_instance(name: str, units: dict[str, dict[str, int]]) -> dict[str, interf
 
 
 def _variables(
-    file: ModelFile, references: dict[Key, int], units: dict[str, dict[str, int]]
+    file: ModelFile, references: dict[Key, int], units: dict[str, Exponents]
 ) -> dict[str, interface.Variable]:
     """Return the variables of a file; `units` gets those that it lacks."""
     tables = {v.name: _entries_of(v, file, units) for v in file.variables.values()}
@@ -279,7 +279,7 @@ def _local(field: str) -> dict[str, object]:
 
 
 def _entries_of(
-    variable: Variable, file: ModelFile, units: dict[str, dict[str, int]]
+    variable: Variable, file: ModelFile, units: dict[str, Exponents]
 ) -> dict[str, object]:
     """Table of a variable of the file."""
     causality = _causality(variable)
@@ -359,7 +359,7 @@ def _fixed(file: ModelFile) -> frozenset[Leaf]:
     return frozenset(said).union(*(e.value.leaves for s in file.sampled for e in s.periods))
 
 
-def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str = "") -> str:
+def _unit(units: dict[str, Exponents], exponents: Exponents, name: str = "") -> str:
     """Return the name of a unit with these exponents, which is in `units` then."""
     exponents = {base: exponent for base, exponent in exponents.items() if exponent}
     if not name:

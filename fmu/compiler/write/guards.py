@@ -185,11 +185,15 @@ def common(first: Path, second: Path) -> Path:
     return first[:length]
 
 
-def known_on(path: Path, conditions: Conditions) -> Known:
-    """Return the knowledge in a branch."""
-    known = Known()
-    for condition, holds in path:
-        known = conditions.assume(condition, holds, known) or known
+def known_on(path: Path, conditions: Conditions, found: dict[Path, Known]) -> Known:
+    """Return the knowledge in a branch; `found`: of those that were asked for before."""
+    if path in found:
+        return found[path]
+    known = found.setdefault((), Known())
+    for i, literal in enumerate(path, 1):
+        if path[:i] not in found:
+            found[path[:i]] = conditions.assume(*literal, known) or known
+        known = found[path[:i]]
     return known
 
 
@@ -222,10 +226,11 @@ def settled(roots: Sequence[Value], conditions: Conditions) -> dict[Value, Value
     """Remove choices that the blocks around them have made; map each value to its successor."""
     places = paths(in_order(roots), dict.fromkeys(roots, ()))
     found: dict[Value, Value] = {}
+    knowledge: dict[Path, Known] = {}
     for value in in_order(roots):
         now = _with(value, [found[a] for a in value.arguments], conditions)
         if value.op == "if" and places[value]:
-            known = known_on(places[value], conditions)
+            known = known_on(places[value], conditions, knowledge)
             choice = conditions.resolve(value.arguments[0], known)
             if choice.op == "number":
                 now = now.arguments[1 if choice.number else 2]
@@ -276,12 +281,14 @@ class Guards:
     def _guards(self) -> dict[Value, Value]:
         """Return conditions that are stronger than the uses' and worth a branch."""
         found: dict[Value, Value] = {}
+        knowledge: dict[Path, Known] = {}
         costs: Counter[tuple[Path, Value]] = Counter()
         inside = costs_inside(self.order, self.paths, self.cost_of)
         for value in self.order:
             if self.cost_of(value) == 0 and value.op != "if":
                 continue
-            guard = self._condition(self.needs[value], known_on(self.paths[value], self.conditions))
+            known = known_on(self.paths[value], self.conditions, knowledge)
+            guard = self._condition(self.needs[value], known)
             has_it = value.op == "if" and value.arguments[0] in (guard, self.conditions.no(guard))
             if guard.op != "number" and not has_it:
                 found[value] = guard
