@@ -192,19 +192,10 @@ def _entry(section: str) -> Schema:
     kinds: list[tuple[Collection[str], str, Schema]] = [(plain, needed, given)]
     if section == "parameters":
         kinds.append((*reader.OWN_KEYS[FOLLOWS], {}))
+        kinds += _counts(*reader.FOLLOWING_COUNTS, [], True)
     if section in reader.NOT_REAL:
-        keys, needed = reader.OWN_KEYS[reader.NOT_REAL[section]]
-        unordered = [key for key in keys if key not in ("min", "max")]
-
-        def start(*values: Schema) -> Schema:
-            return {"start": _start(*values)} if "start" in keys else {}
-
-        given = {"type": {"const": BOOLEAN}} | start(TRUTH, *follows)
-        kinds.append((unordered, needed, given))
-        if reader.NOT_REAL[section] != SWITCHES:
-            whole = {"min": WHOLE, "max": WHOLE} | start(WHOLE, *follows)
-            kinds.append((keys, needed, {"type": {"const": INTEGER}} | whole))
-            kinds.append((unordered, needed, {"type": ENUMERATION} | start({"type": "string"})))
+        has_others = reader.NOT_REAL[section] != SWITCHES
+        kinds += _counts(*reader.OWN_KEYS[reader.NOT_REAL[section]], follows, has_others)
     known = [*dict.fromkeys(key for keys, *_ in kinds for key in keys)]
     found = _keys(known) | {"anyOf": []}
     for keys, needed, own in kinds:
@@ -212,6 +203,26 @@ def _entry(section: str) -> Schema:
         required = [key for key in (needed, "type" if "type" in own else "") if key]
         found["anyOf"].append({"properties": others | own, "required": required})
     return {"anyOf": [EXPRESSION, found]} if section == "where" else found
+
+
+def _counts(
+    keys: Collection[str], needed: str, follows: list[Schema], has_others: bool
+) -> list[tuple[Collection[str], str, Schema]]:
+    """Return the entries of a Boolean and, if there are others, an Integer and an enumeration.
+
+    Each has its keys, the one that it needs, and the schemas of some; follows: of starts, too.
+    """
+    unordered = [key for key in keys if key not in ("min", "max")]
+
+    def start(*values: Schema) -> Schema:
+        return {"start": _start(*values)} if "start" in keys else {}
+
+    found = [(unordered, needed, {"type": {"const": BOOLEAN}} | start(TRUTH, *follows))]
+    if has_others:
+        whole = {"min": WHOLE, "max": WHOLE} | start(WHOLE, *follows)
+        found.append((keys, needed, {"type": {"const": INTEGER}} | whole))
+        found.append((unordered, needed, {"type": ENUMERATION} | start({"type": "string"})))
+    return found
 
 
 def _data() -> Schema:

@@ -309,9 +309,11 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
     if (instance == NULL) {
         return fmi2Error;
     }
-    *enterEventMode = instance_complete_step(instance);
+    bool has_event;
+    const enum status status = instance_complete_step(instance, &has_event);
+    *enterEventMode = has_event;
     *terminateSimulation = instance_has_ended(instance) ? fmi2True : fmi2False;
-    return fmi2OK;
+    return result(c, status);
 }
 
 /* ---- Model Exchange: time and states -------------------------------------------------------- */

@@ -525,9 +525,9 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
     if (entered == NULL) {
         return fmi3Error;
     }
-    *enterEventMode = instance_complete_step(entered);
+    const enum status status = instance_complete_step(entered, enterEventMode);
     *terminateSimulation = instance_has_ended(entered);
-    return fmi3OK;
+    return result(instance, status);
 }
 
 /* ---- Model Exchange: time and states -------------------------------------------------------- */

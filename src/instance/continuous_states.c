@@ -28,10 +28,11 @@ void instance_enter_event_mode(struct instance *instance) {
     }
 }
 
-bool instance_complete_step(struct instance *instance) {
+enum status instance_complete_step(struct instance *instance, bool *has_event) {
     instance_note_inputs(instance);
     instance_move_anchors(instance);
-    return instance_has_missed_event(instance);
+    *has_event = instance_has_missed_event(instance);
+    return instance_check_conditions(instance);
 }
 
 static enum status update_discrete_states(struct instance *instance, bool *states_changed) {

@@ -7,8 +7,8 @@
 MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);
 NONNULL void instance_enter_event_mode(struct instance *instance);
 
-/* Ends a step of the integrator outside. Returns true if event mode is needed. */
-MUST_CHECK NONNULL bool instance_complete_step(struct instance *instance);
+/* Ends a step of the integrator outside. *has_event: true if event mode is needed. */
+MUST_CHECK NONNULL enum status instance_complete_step(struct instance *instance, bool *has_event);
 
 struct discrete_update {
     bool has_ended;      /* true if an event has ended the simulation */

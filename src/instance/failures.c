@@ -200,15 +200,17 @@ static void explain_field(const struct place *place, size_t offset, bool is_slop
     const struct expression *expression = expression_at(place, offset);
     const struct variable *variable = variable_at(place->instance, offset);
     const bool is_int = variable != NULL && variable->type != VARIABLE_FLOAT64;
+    const bool has_no_value = is_int && variable->type != VARIABLE_INT32;
     add_name(place->instance, offset, to);
     if (expression != NULL) {
         add(to, ": ");
         add_expression(to, expression->text);
     }
     add(to, " %s at t = %.17g",
-        is_slope ? "has no finite slope"
-        : is_int ? "is no number of 32 bits"
-                 : "is not finite",
+        is_slope       ? "has no finite slope"
+        : has_no_value ? "has no value"
+        : is_int       ? "is no number of 32 bits"
+                       : "is not finite",
         place->t);
     if (expression != NULL) {
         add_cause(place, expression->text, to);

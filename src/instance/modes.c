@@ -138,6 +138,23 @@ enum status instance_update_modes(struct instance *instance, const bool *trigger
     return update(instance, triggered, INFINITY);
 }
 
+enum status instance_check_conditions(struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    if (events == NULL || events->undefined == NULL) {
+        return STATUS_OK;
+    }
+    const double t = instance->state.time.s;
+    const char *undefined = events->undefined(instance->memory.values, t);
+    if (undefined == NULL) {
+        return STATUS_OK;
+    }
+    struct explanation why = {.length = 0};
+    instance_explain_text(instance, strchr(undefined, '=') + 1, &why);
+    message_write(&instance->sink, STATUS_NOT_FINITE, "at t = %.17g: %.200s has no value%s", t,
+                  undefined, why.text);
+    return STATUS_NOT_FINITE;
+}
+
 /* Counts how often an indicator has fallen in a row; the two limits of a floor have one name. */
 static void note_indicator(const char *const names[], const bool triggered[],
                            struct event_counts *in_step) {

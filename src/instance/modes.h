@@ -9,6 +9,9 @@
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_update_modes(struct instance *instance, const bool *triggered);
 
+/* Fails, with a message, if a condition of an event has no value at the current time. */
+MUST_CHECK NONNULL enum status instance_check_conditions(struct instance *instance);
+
 /* Numbers of events in one communication step so far. */
 struct event_counts {
     int of_states; /* at most max_events */

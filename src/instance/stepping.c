@@ -588,6 +588,10 @@ enum status instance_do_step(struct instance *instance, double communication_poi
     if (!instance->inputs_are_held) {
         end_inputs(&step);
     }
+    if (status == STATUS_OK && state->event_point != EVENT_UNHANDLED) {
+        status = instance_check_conditions(instance);
+        step.has_message = status != STATUS_OK;
+    }
     if (status != STATUS_OK) {
         return fail(&step, status);
     }

@@ -63,6 +63,12 @@ static bool update_modes_at(const struct domains *model, struct domains_room roo
     return update_modes(model, room, values, t);
 }
 
+bool domains_follow(const struct domains *model, struct domains_room room, const void *values,
+                    double t) {
+    memcpy(room.values, values, model->values_size);
+    return update_modes(model, room, values, t);
+}
+
 enum status domains_right_hand_side(const struct domains *model, struct domains_room room,
                                     const void *values, double t, const double x[],
                                     const double u[], double dx[]) {
@@ -113,14 +119,22 @@ static void complete_calculated(const struct domains *model, void *values, void 
              count_of(model->calculated));
 }
 
+static void complete_counts(const struct domains *model, void *values, const void *other) {
+    int *count = (int *)(void *)((char *)values + model->counts.offset);
+    const int *others = (const int *)(const void *)((const char *)other + model->counts.offset);
+    for (size_t i = 0; i < model->counts.size / sizeof *count; i++) {
+        count[i] = count[i] == MODEL_NO_INT ? others[i] : count[i];
+    }
+}
+
 enum status domains_outputs(const struct domains *model, struct domains_room room, void *values,
                             double t) {
-    memcpy(room.values, values, model->values_size);
-    if (!update_modes(model, room, values, t)) {
+    if (!domains_follow(model, room, values, t)) {
         return STATUS_OK;
     }
     const enum status status = model->outputs(room.values, t);
     complete_calculated(model, values, room.values);
+    complete_counts(model, values, room.values);
     complete_indicators(model, room, values, doubles_in(values, model->indicators),
                         doubles_in(room.values, model->indicators));
     return status;
@@ -129,8 +143,7 @@ enum status domains_outputs(const struct domains *model, struct domains_room roo
 enum status domains_derivatives(const struct domains *model, struct domains_room room,
                                 const void *values, double t, double dt, void *first,
                                 void *second) {
-    memcpy(room.values, values, model->values_size);
-    if (!update_modes(model, room, values, t)) {
+    if (!domains_follow(model, room, values, t)) {
         return STATUS_OK;
     }
     memcpy(room.first, first, model->values_size);

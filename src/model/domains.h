@@ -16,6 +16,7 @@ struct domains {
     struct range inputs;
     struct range calculated; /* double[]: all calculated fields except the indicators */
     struct range indicators; /* double[] */
+    struct range counts;     /* int[]: all calculated ints, if one may have no value */
     size_t modes;            /* offset of int[]: the mode of each relation */
     int relation_count;
     const struct relation *relation;
@@ -52,6 +53,12 @@ struct domains_room {
 /* True if all calculated fields are finite. */
 static inline bool domains_are_calculated(const struct domains *model, const void *values) {
     const char *begin = values;
+    const int *counts = (const int *)(const void *)(begin + model->counts.offset);
+    for (size_t i = 0; i < model->counts.size / sizeof *counts; i++) {
+        if (counts[i] == MODEL_NO_INT) {
+            return false;
+        }
+    }
     return relations_are_finite((const double *)(const void *)(begin + model->calculated.offset),
                                 model->calculated.size / sizeof(double)) &&
            relations_are_finite((const double *)(const void *)(begin + model->indicators.offset),
@@ -86,6 +93,11 @@ enum status domains_outputs(const struct domains *model, struct domains_room roo
                             double t);
 enum status domains_derivatives(const struct domains *model, struct domains_room room,
                                 const void *values, double t, double dt, void *first, void *second);
+
+/* Copies the values to room.values with the modes that follow from the states and inputs. Returns
+ * false if these are the same. */
+bool domains_follow(const struct domains *model, struct domains_room room, const void *values,
+                    double t);
 
 /* Extends a series from order 0 on, if domains_has_begun is false. */
 enum status domains_extend(const struct domains *model, struct domains_room room,

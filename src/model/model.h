@@ -122,6 +122,10 @@ struct model_events {
      * parameters, inputs, states, modes. If there is no event, a second call changes nothing. */
     enum status (*update)(void *values, const struct event *event);
 
+    /* Returns "NAME = expression" of an event's condition that has no value now, beyond all events
+     * that have come; NULL if all have one. NULL if none can miss it. */
+    const char *(*undefined)(const void *values, double t);
+
     /* True if an event has ended the simulation: its name and reason go to text (size bytes) as one
      * line. NULL if no event does so. */
     bool (*has_ended)(const void *values, double t, char *text, size_t size);

@@ -63,6 +63,27 @@ static enum status refuse(const struct call *call, const struct event *event,
     return STATUS_NOT_FINITE;
 }
 
+/* Returns STATUS_NOT_FINITE, with the reason, if a condition or whole number of an event, or of
+ * RELATIONS_START or RELATIONS_CONDITIONS, has no value. */
+static enum status check_defined(const struct call *call, int number, const struct event *event) {
+    const struct relations *model = call->model;
+    if (model->undefined == NULL) {
+        return STATUS_OK;
+    }
+    const char *undefined =
+        model->undefined(call->values, call->t, relations_later(call->t, call->error), number);
+    if (undefined == NULL) {
+        return STATUS_OK;
+    }
+    if (event->reason != NULL) {
+        (void)snprintf(event->reason, event->reason_size, "%.200s has no value", undefined);
+    }
+    if (event->text != NULL) {
+        *event->text = strchr(undefined, '=') + 1;
+    }
+    return STATUS_NOT_FINITE;
+}
+
 /* Returns STATUS_NOT_FINITE, with the reason, if a whole number is none that an int holds. */
 static enum status check_counts(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
@@ -88,6 +109,10 @@ static enum status check_counts(const struct call *call, const struct event *eve
 static enum status assign(const struct call *call, int number, const struct event *event) {
     const struct relations *model = call->model;
     const struct assignment *refused = NULL;
+    const enum status status = check_defined(call, number, event);
+    if (status != STATUS_OK) {
+        return status;
+    }
     for (int i = 0; i < model->assignment_count; i++) {
         const struct assignment *own = &model->assignment[i];
         call->room.assigned[i] = *(double *)(void *)((char *)call->values + own->offset);
@@ -212,12 +237,13 @@ static void add_name(const struct event *event, const char *name) {
 }
 
 /* Finds the events whose conditions hold; the others may fire again. */
-static void look_at_conditions(const struct call *call) {
+static enum status look_at_conditions(const struct call *call, const struct event *event) {
     const int *due = call->room.due;
     call->model->find_due(call->values, call->t, call->room.due);
     for (int k = 0; k < call->model->event_count; k++) {
         call->active[k] = call->active[k] && due[k];
     }
+    return check_defined(call, RELATIONS_CONDITIONS, event);
 }
 
 /* Runs the events that have become due, in their order. *fires: false if there was none. is_last:
@@ -225,9 +251,8 @@ static void look_at_conditions(const struct call *call) {
 static enum status run_due_events(const struct call *call, const struct event *event, bool is_last,
                                   bool *fires) {
     const struct relations *model = call->model;
-    enum status status = STATUS_OK;
+    enum status status = look_at_conditions(call, event);
     *fires = false;
-    look_at_conditions(call);
     for (int i = 0; status == STATUS_OK && i < model->event_count; i++) {
         if (call->room.due[i] && !call->active[i]) {
             status = perform(call, i, event);
@@ -239,7 +264,7 @@ static enum status run_due_events(const struct call *call, const struct event *e
             if (status == STATUS_OK && is_last) {
                 add_name(event, model->change_names[i]);
             }
-            look_at_conditions(call);
+            status = status == STATUS_OK ? look_at_conditions(call, event) : status;
         }
     }
     return status;

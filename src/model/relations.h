@@ -61,6 +61,9 @@ struct given {
     bool is_free; /* true if solutions are searched in the modes that follow from them */
 };
 
+/* Numbers, in the place of an event's, of the start values and of the conditions of all events. */
+enum { RELATIONS_START = -1, RELATIONS_CONDITIONS = -2 };
+
 struct relations {
     size_t values_size;
     /* int[]: 1 if initialization has ended; the mode of each relation; 1 per event that is due;
@@ -102,6 +105,10 @@ struct relations {
      * values before it; a state that jumps gets the tolerance of its right side. later: time at
      * which right sides see what switches by the time, s. */
     void (*change)(void *values, double t, double later, int event, double tolerance[]);
+    /* Returns "NAME = expression" of a condition or whole number that has no value: of what
+     * `change` would assign, or of RELATIONS_START, RELATIONS_CONDITIONS; NULL if all have one.
+     * NULL if none can miss it. */
+    const char *(*undefined)(const void *values, double t, double later, int event);
 };
 
 /* Memory for one call. */

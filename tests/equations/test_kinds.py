@@ -83,6 +83,56 @@ def test_a_whole_number_of_more_than_32_bits_is_named() -> None:
         assert unit.fmi.getInteger(more) == [2 * 10**9]
 
 
+def test_parameters_that_follow_may_be_no_real_numbers() -> None:
+    """Each from parameters, in the expressions of others, of events, starts and checks."""
+    text = """name = "Encoder"
+[parameters]
+lines = { type = "Integer", start = 5 }
+m = { start = 4 }
+Ts = { start = 0.1 }
+edges = { type = "Integer", value = "4 * lines", max = 1000 }
+half = { value = "edges / 2 if big else 0" }
+big = { type = "Boolean", value = "m > 3" }
+fast = { type = "Boolean", value = "Ts < 1" }
+kind = { type = ["small", "large"], value = '"large" if big and edges > 10 else "small"' }
+"part[i]" = { for = "i = 1..2", type = "Integer", value = "i * edges" }
+[discrete]
+count = { type = "Integer", start = "edges" }
+[sampled.s]
+every = "Ts"
+while = 'fast and kind == "large"'
+set = { count = "count + part[2]" }
+[states]
+x = { derivative = "half if big else -1" }
+[check]
+"{edges} edges" = "edges < 900"
+"""
+    fmu, names = made(text), ["edges", "half", "big", "fast", "kind", "part[2]", "count", "x"]
+    expected = {(5, 4): [20, 10, 1, 1, 2, 40, 460, 10], (5, 1): [20, 0, 0, 1, 1, 40, 20, -1],
+                (2, 4): [8, 4, 1, 1, 1, 16, 8, 4]}  # fmt: skip
+    for version in ("", "fmi3"):
+        own = fmu.parent / version / fmu.name
+        found = {v.name: v for v in fmpy.read_model_description(own).modelVariables}
+        for name in ("edges", "big", "fast", "kind", "part[1]"):
+            kept = (found[name].causality, found[name].initial, found[name].variability)
+            assert kept == ("calculatedParameter", "calculated",
+                            "fixed" if name == "fast" else "tunable")  # fmt: skip
+        for fmi_type in ("CoSimulation", "ModelExchange"):
+            for (lines, m), last in expected.items():
+                run = simulated(
+                    own, 1.0, 0.1, {"lines": lines, "m": m}, fmi_type=fmi_type, also=names[:6]
+                )[-1]  # fmt: skip
+                assert [run[name] for name in names] == pytest.approx(last)
+    variables = declared(read(fmu.with_suffix(".toml"))).variables
+    assert variables["kind"].parameters == ("lines", "m") and variables["edges"].max == 1000
+    with Instance(loaded(fmu), logging_on=True) as unit:
+        unit.begin()
+        unit.fmi.setInteger([unit.loaded.references["lines"]], [250])
+        with pytest.raises(FMICallException, match="error"):
+            unit.fmi.exitInitializationMode()
+        assert unit.messages[-1].text == "1000 edges"
+
+
 # ---- Random numbers ------------------------------------------------------------------------------
 
 

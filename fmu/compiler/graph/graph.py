@@ -19,7 +19,7 @@ from functools import partial, reduce
 
 from ..expressions.expression import RANDOM, RELATIONS, Node, in_order
 from ..expressions.parser import parse
-from . import algebraic
+from . import algebraic, undefined
 from .algebraic import GIVEN, UNKNOWN, Linear, System
 from .tables import FAR, LookupTable
 
@@ -62,8 +62,6 @@ DERIVATIVES = {
 }
 # of finite arguments, some results are not finite
 FALLIBLE = ("/", "sqrt", "log", "asin", "acos", "pow", "exp", "sinh", "cosh", "solution", "linear")
-# some are not a number
-UNDEFINED = ("/", "sqrt", "log", "asin", "acos", "pow", "solution", "linear")
 GROWING = ("exp", "sinh", "cosh")  # results overflow
 # slopes may be infinite or undefined
 STEEP = ("sqrt", "log", "asin", "acos", "pow", "atan2", "hypot")
@@ -80,7 +78,7 @@ class Value:
     name: str
     number: float
     leaves: frozenset[tuple[str, str]]  # operation and name of all leaves that it follows from
-    functions: frozenset[str]  # of FALLIBLE and STEEP, those that it follows from
+    functions: frozenset[str]  # of FALLIBLE, STEEP and "element", those that it follows from
     moves: bool  # it may change while parameters and modes stay
 
 
@@ -183,6 +181,8 @@ class Graph:
         key = (op, tuple(map(id, arguments)), name, number.hex())
         if key not in self.known:
             own, used = {(op, name)} if op in LEAVES else (), NOTED & {op}
+            if op == "element" or name and math.isnan(number):
+                used = {"element"}
             leaves = frozenset(own).union(*[argument.leaves for argument in arguments])
             functions = used.union(*[argument.functions for argument in arguments])
             moves = op in MOVING or any([argument.moves for argument in arguments])
@@ -259,9 +259,9 @@ class Graph:
         if elements[0].op in CONDITIONS:
             chosen = [self.value("and", *pair) for pair in zip(places, elements, strict=True)]
             value = reduce(partial(self.value, "or"), chosen)
-            self.unknowns[value] = self.value("not", reduce(partial(self.value, "or"), places))
+            undefined.unknown_without(self, value, places)
             return value
-        value = self.number(math.nan)
+        value = self.value("number", name="none", number=math.nan)
         for place, element in zip(places[::-1], elements[::-1], strict=True):
             value = self.value("if", place, element, value)
         return value
@@ -281,7 +281,10 @@ class Graph:
             for i, (x, k) in enumerate(zip(given, places, strict=True))
         ]
         powers = range(len(table.coefficients))
-        found = [self.value("entry", *places, name=table.array("c", i)) for i in powers]
+        number = math.nan if table.ends else 0.0  # outside there is no value
+        found = [
+            self.value("entry", *places, name=table.array("c", i), number=number) for i in powers
+        ]
         if len(given) == 1:
             return reduce(
                 lambda sum_, c: self.value("+", c, self.value("*", sum_, distances[0])), found[::-1]
@@ -345,31 +348,8 @@ class Graph:
         )
 
     def unknown(self, condition: Value) -> Value | None:
-        """Whether a relation that decides on a condition has no value; None: all have one."""
-        if condition not in self.unknowns:
-            self.unknowns[condition] = self._unknown(condition)
-        return self.unknowns[condition]
-
-    def _unknown(self, condition: Value) -> Value | None:
-        if condition.name in self.relations:
-            sides = self.relations[condition.name].distance.arguments
-        elif condition.op in (*RELATIONS, "=="):
-            sides = condition.arguments
-        else:
-            unknown = [self.unknown(argument) for argument in condition.arguments]
-            if condition.op in ("and", "or") and unknown[1] is not None:  # if it is looked at
-                first = condition.arguments[0]
-                passes = first if condition.op == "and" else self.value("not", first)
-                unknown[1] = self.value("and", passes, unknown[1])
-            return self._any(unknown)
-        return self._any(
-            self.value("isnan", side) if side.functions.intersection(UNDEFINED) else None
-            for side in sides
-        )
-
-    def _any(self, conditions: Iterable[Value | None]) -> Value | None:
-        found = [condition for condition in conditions if condition is not None]
-        return reduce(partial(self.value, "or"), found) if found else None
+        """Whether a condition has no value, as undefined.py says; None: it always has one."""
+        return undefined.unknown(self, condition)
 
     def relation(self, op: str, left: Value, right: Value) -> Value:
         """A comparison of two values: a switch if one of them moves and the graph has switches."""

@@ -12,13 +12,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..expressions.dimensions import dimension_of, of_exponents
-from ..expressions.expression import CONSTANTS, ExpressionError, Node, in_order, with_names
-from ..expressions.kinds import CONDITION, NUMBER, WHOLE, with_kinds
-from ..expressions.parser import Function, Lookup, table_unit
-from ..graph.tables import read as table_of
+from ..expressions.expression import ExpressionError, Node, in_order, with_names
+from ..expressions.kinds import CONDITION, NUMBER, WHOLE
+from ..expressions.parser import table_unit
 from ..units import ANGLE, BASE, Unit
-from . import header, keys, terminals
+from . import functions, header, keys, terminals
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
 from .components import Components, check_loop, of_loop
@@ -48,11 +46,6 @@ INSTANCE = Path(__file__).resolve().parents[3] / "src" / "instance"
 MOST_VARIABLES = 20_000
 
 
-def _named(name: str) -> str:
-    """Return a name as messages have it: in quotes if it is none."""
-    return name if re.fullmatch(rf"{keys.NAME.pattern}(\[[^]]+\].*)?", name) else shown(name)
-
-
 def solver_names() -> set[str]:
     """Return the names of the variables that models get without declaring them."""
     tables = [tables_of(path)[1] for path in INSTANCE.glob("*_variables.toml")]
@@ -79,7 +72,7 @@ def read_tables(
     file.indicators = head.get("indicators", [])
     file.time_events = head.get("time_events", False)
     for size, number in head.get("sizes", {}).items():
-        with placed("[sizes]", _named(size)):
+        with placed("[sizes]", keys.named(size)):
             _check_name(size, file)
             if type(number) is not int or not 0 <= number <= keys.MOST_SIZE:
                 raise ModelFileError(
@@ -91,7 +84,7 @@ def read_tables(
             known = keys.entries(given, (*BASE, ANGLE), what="base unit")
             file.units[symbol] = Unit(known, base=symbol)
     for name, entry in head.get("tables", {}).items():
-        _read_table(file, name, entry)
+        functions.read_table(file, name, entry)
     if "code" in head:
         with placed("code"):
             file.code = read_code([path.parent / name for name in head["code"]], header.made)
@@ -100,9 +93,9 @@ def read_tables(
                 if function.is_helper and name in keys.TAKEN:
                     continue
                 with placed(f"{function.place}: {name}"):
-                    _check_function_name(name, file)
+                    functions.check_name(name, file)
                 file.functions[name] = function
-    _read_functions(file, head.get("functions", {}))
+    functions.read(file, head.get("functions", {}))
     if "hook" in head:
         _read_hook(file, head)
     parts = Components(file, read, (*above, path.resolve()))
@@ -119,7 +112,7 @@ def read_tables(
     if not file.variables:
         raise ModelFileError("has no variables, expected a section such as [states]")
     for element in _elements(file, "modes", modes):
-        with placed("modes", _named(element.shown)):
+        with placed("modes", keys.named(element.shown)):
             _check_name(element.name, file)
             start = element.entry
             if isinstance(start, dict):
@@ -221,86 +214,6 @@ def _read_check(file: ModelFile, message: str, entry: object) -> None:
         file.checks.append((text, condition))
 
 
-def _read_table(file: ModelFile, name: str, entry: object) -> None:
-    with placed(f"[tables.{_named(name)}]"):
-        _check_function_name(name, file)
-        given = dict(entry) if isinstance(entry, dict) else {}
-        units = given.pop("unit", {})
-        given = keys.entries(given or entry, (*keys.TABLE, "unit"), "x")
-        arguments = ("x", "y") if "z" in given else ("x",)
-        columns = (*arguments, "z" if "z" in given else "y")
-        if not isinstance(units, dict) or not all(type(unit) is str for unit in units.values()):
-            wanted = "unit: expected a table such as { x = 'm' }"
-            raise ModelFileError(f"{wanted}, got {shown(units)}")
-        measures = {}
-        for key in units:
-            if key not in columns:
-                wanted = f"expected {', '.join(columns)}"
-                raise ModelFileError(f"unit: unknown key {shown(key)}, {wanted}")
-            measures[key] = file.unit(units[key])
-            axis = "" if key == columns[-1] else columns.index(key)
-            file.table_units[table_unit(name, axis)] = measures[key].exponents
-        file.tables[name] = table_of(name, given, file.path.parent, measures)
-        file.functions[name] = Lookup(name, arguments)
-
-
-def _check_function_name(name: str, file: ModelFile) -> None:
-    if not keys.NAME.fullmatch(name):
-        raise ModelFileError("expected a name: a letter, then letters, digits, _")
-    if name in keys.RESERVED - keys.FUNCTIONS.keys():
-        why = keys.reason(name, False)
-        raise ModelFileError(f"this name is reserved ({why}), choose another one")
-    if name in (*keys.TAKEN, *file.functions):
-        raise ModelFileError("expected a name that is no function already")
-
-
-def _read_functions(file: ModelFile, entries: dict[str, object]) -> None:
-    """Read units of functions of the C file, then functions, which may call those before them."""
-    in_c = file.code.functions if file.code else {}
-    of_c = {name: entry for name, entry in entries.items() if name in in_c}
-    for name, entry in (of_c | entries).items():
-        with placed("[functions]", _named(name)):
-            needed = "" if name in in_c else "value"
-            given = keys.entries(entry, ("arguments", "value", "unit"), needed)
-            arguments, units = given.get("arguments", {}), {}
-            order = (*arguments,) if "value" in given else in_c[name].arguments
-            if {*order} != {*arguments}:
-                raise ModelFileError(f"arguments: expected all of the C file: {', '.join(order)}")
-            if "unit" in given or any(arguments.values()):
-                if "" in arguments.values():
-                    raise ModelFileError("unit: expected units of arguments, too: { x = 'm' }")
-                units = {table_unit(name, order.index(a)): u for a, u in arguments.items()}
-                units |= {table_unit(name): given.get("unit", "1")}
-                file.table_units |= {k: file.unit(u).exponents for k, u in units.items()}
-            if "value" in given:
-                own = _function(file, name, arguments, given["value"], bool(units))
-                file.functions[name] = own
-
-
-def _function(
-    file: ModelFile, name: str, arguments: dict[str, str], text: object, has_units: bool
-) -> Function:
-    """Return a function, whose arguments and value have units in the file, or take any."""
-    _check_function_name(name, file)
-    taken = (*keys.RESERVED, *file.sizes)
-    if not arguments:
-        wanted = "expected one name at least: what has no arguments is an entry of [where]"
-        raise ModelFileError(f"arguments: {wanted}, or of [parameters] with a value")
-    if not all(keys.NAME.fullmatch(a) and a not in taken for a in arguments):
-        raise ModelFileError("arguments: expected names, each once and none reserved")
-    value = file.expression(Element(name, name, text), ("value",), text)
-    for node in in_order([value.tree]):
-        if node.op == "name" and node.name not in (*arguments, *CONSTANTS):
-            raise ExpressionError(node.column, f"{shown(node.name)} is no argument")
-    body = with_kinds(value.tree)
-    if has_units:
-        units = {key: of_exponents(found) for key, found in file.table_units.items()}
-        units |= {a: units[table_unit(name, i)] for i, a in enumerate(arguments)}
-        with placed("value"):
-            dimension_of(body, units, units[table_unit(name)])
-    return Function((*arguments,), body, name=name if has_units else "")
-
-
 def _experiment(given: dict[str, float]) -> dict[str, float]:
     found = keys.EXPERIMENT | given
     if "step" not in given:
@@ -313,7 +226,7 @@ def _experiment(given: dict[str, float]) -> dict[str, float]:
 
 
 def _read_variable(file: ModelFile, section: str, element: Element) -> None:
-    place = (f"[{section}]", _named(element.shown))
+    place = (f"[{section}]", keys.named(element.shown))
     with placed(*place):
         _check_name(element.name, file)
         entry = element.entry
@@ -364,7 +277,7 @@ def _keys(section: str, entry: object, file: ModelFile) -> tuple[tuple[str, ...]
         return keys.SECTIONS[section][0], ""
     known, needed = keys.SECTIONS[section]
     if section == "parameters" and isinstance(entry, dict) and "value" in entry:
-        known, needed = keys.OWN_KEYS[FOLLOWS]
+        known, needed = keys.FOLLOWING_COUNTS if "type" in entry else keys.OWN_KEYS[FOLLOWS]
     elif section in keys.NOT_REAL and isinstance(entry, dict) and "type" in entry:
         known, needed = keys.OWN_KEYS[keys.NOT_REAL[section]]
     if file.is_by_hand:
@@ -376,24 +289,23 @@ def _keys(section: str, entry: object, file: ModelFile) -> tuple[tuple[str, ...]
 
 def _section(section: str, given: dict[str, Any]) -> str:
     """Return the section of a variable by its type, which becomes its kind."""
-    if section == "parameters" and "value" in given:
-        return FOLLOWS
     kind = given.pop("type", NUMBER)
+    follows = section == "parameters" and "value" in given
     if kind == NUMBER:
-        return section
+        return FOLLOWS if follows else section
     if section == "inputs" and kind != CONDITION:
         raise ModelFileError(f'type: expected "{BOOLEAN}": other inputs are real numbers')
     if kind != WHOLE and {"min", "max"} & given.keys():
         raise ModelFileError("min and max are for numbers")
     given["kind"] = kind
-    return keys.NOT_REAL[section]
+    return FOLLOWS if follows else keys.NOT_REAL[section]
 
 
 def _set_start(section: str, given: dict[str, Any], texts: dict[str, Any]) -> None:
     """Read a start value by its kind; one that follows from parameters goes into the texts."""
     kind, start = given.get("kind", NUMBER), given.get("start")
     if isinstance(kind, tuple) and (start is None or start in kind):
-        if section not in keys.CALCULATED:
+        if section not in (*keys.CALCULATED, FOLLOWS):
             given["start"] = kind.index(start or kind[0]) + 1
         return
     wanted = "true or false" if kind == CONDITION else kind
@@ -501,7 +413,7 @@ def _change(
     file: ModelFile, section: str, element: Element, known: tuple[str, ...]
 ) -> tuple[str, dict[str, Any]]:
     """Return the place of an event or sampler, and its entries; it needs the first of its keys."""
-    place = f"[{section}.{_named(element.shown)}]"
+    place = f"[{section}.{keys.named(element.shown)}]"
     with placed(place):
         _check_name(element.name, file)
         file.happening[element.name] = section
@@ -567,12 +479,18 @@ def _local(
     found: list[Expression] = []
     known: dict[str, Node] = {}
     for name, text in entries.items():
-        whole = (place, f"where: {_named(name)}")
+        whole = (place, f"where: {keys.named(name)}")
         with placed(*whole):
             _check_name(name, file)
             if name in (*file.indexes, *element.indexes):
                 raise ModelFileError("this name is an index of for, too")
         own = file.expression(element, whole, text, None, event="then")
+        for node in in_order([own.tree]):
+            if node.op == "name" and node.name in entries and node.name not in known:
+                below = "is this entry itself" if node.name == name else "stands below"
+                wanted = f"{shown(node.name)} {below}: expected a name that stands above"
+                with placed(*whole):
+                    raise ExpressionError(node.column, wanted)
         own.tree = with_names(own.tree, known)
         known[name] = own.tree
         found.append(own)

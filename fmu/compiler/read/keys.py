@@ -60,6 +60,7 @@ OWN_KEYS = {
     "where": ((*OF_COUNTS, "shown"), "value"),
     "outputs": (OF_COUNTS, "value"),
 }
+FOLLOWING_COUNTS = OWN_KEYS["outputs"]  # parameters that follow, as outputs
 NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
@@ -104,6 +105,11 @@ def reason(name: str, is_rate: bool) -> str:
     if name in ("pi", "time", *NO_NAMES):
         return "expressions use it"
     return "the C code uses it" if name in RESERVED else "the FMU has a variable of this name"
+
+
+def named(name: str) -> str:
+    """Return a name as messages have it: in quotes if it is none."""
+    return name if re.fullmatch(rf"{NAME.pattern}(\[[^]]+\].*)?", name) else shown(name)
 
 
 def plain_text(value: object) -> str:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 
 from ..expressions import dimensions
 from ..expressions.dimensions import Dimension, dimension_of, of_exponents, times
@@ -238,9 +239,7 @@ def _check_units(file: ModelFile) -> None:
             try:
                 unit = dimension_of(expression.tree, units, expected)
             except ExpressionError as error:
-                read = sorted(names(expression.tree).intersection(bare))
-                hint = f"; without a unit: {', '.join(read)}" if read else ""
-                raise ModelFileError(f"{error}{hint}") from None
+                raise ModelFileError(f"{error}{_without(expression, bare, units)}") from None
         if expression.target:
             units.setdefault(expression.target, unit)
     for variable in file.of("where"):
@@ -266,6 +265,18 @@ def _check_numbers(file: ModelFile) -> None:
         if not expression.is_checked:
             with placed(*expression.place):
                 dimension_of(expression.tree, units)
+
+
+def _without(
+    expression: Expression, bare: Collection[str], units: Mapping[str, Dimension | None]
+) -> str:
+    """Say which unit may be missing: that of the entry, if its expression has one, or of names."""
+    if expression.target in bare:
+        with suppress(ExpressionError):
+            dimension_of(expression.tree, units)
+            return f"; {expression.target} itself has no unit"
+    read = sorted(names(expression.tree).intersection(bare))
+    return f"; without a unit: {', '.join(read)}" if read else ""
 
 
 def _add_units(file: ModelFile, block: Block, units: dict[str, Dimension | None]) -> None:

@@ -18,6 +18,7 @@ from ..names import Field, c_name
 from ..plain_c.values import Conditions
 from ..read.content import CALCULATED, COUNTS, SWITCHES, Change, ModelFile, Sampler
 from ..units import Exponents
+from . import c_undefined
 from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
@@ -105,9 +106,9 @@ def ticks(file: ModelFile) -> list[Tick]:
             variable, new, unit = file.variables.get(target), given.value, {}
             old = variable.leaf if variable else graph.value("mode", name=target)
             if old.op == "mode":
-                new, old = (graph.value("if", value, one, zero) for value in (new, old))
+                new, old = (graph.choice(value, one, zero) for value in (new, old))
             if sampler.during is not None:
-                new = graph.value("if", sampler.during.value, new, old)
+                new = graph.choice(sampler.during.value, new, old)
             if old.op in ("state", "discrete"):
                 meaning, unit = "new value", variable.exponents
             else:  # the change, which is 0 or not
@@ -299,6 +300,7 @@ class Events:
                 for i, change in enumerate([*file.events, *file.sampled])
                 for line in self._change(i, change)
             ],
+            **c_undefined.parts(file, self.leaves, in_domain),
             descriptions=self._describe(),
             names=", ".join(
                 [text(file.relation_texts[places[r.name]][:100]) for r in self.located] or ["NULL"]

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..expressions.expression import RELATIONS, in_order
+from ..expressions.kinds import CONDITION
 from ..graph.band import band
 from ..graph.curve import Curve
 from ..graph.graph import FALLIBLE, Value, is_number
 from ..names import Field
 from ..read.content import CALCULATED, OPTIONS, ModelFile
-from . import c_algebraic, c_hook
+from . import c_algebraic, c_hook, c_undefined
 from .c_code import Code, of_both, told
 from .c_events import Events, arrays, count, leaves, ticks
 from .c_series import Series
@@ -289,7 +290,8 @@ def _domains(
     text = filled(
         "domains.c.in",
         distances=Code(leaves(file).but({}, is_free="true")).assign(distances).lines(),
-        ranges=_range_lines(file, groups),
+        ranges=[*_range_lines(file, groups), *_counts_in_domain(file)],
+        undefined=c_undefined.IN_DOMAIN if c_undefined.has_conditions(file) else [],
         own_row=series.row_count,
         solutions=_solutions(series, ".solution"),
         anchors=c_algebraic.anchors(file),
@@ -303,12 +305,24 @@ def _domains(
         "                                    int last, double row[][SERIES_LENGTH]);",
         "",
     ]
+    if c_undefined.has_conditions(file):
+        declared[-1:] = [c_undefined.DECLARED_IN_DOMAIN, ""]
     return {
         "in_domain": "_in_domain",
         "domains_header": ['#include "domains.h"'],
         "domains_declared": declared,
         "domains": text.splitlines(),
     }
+
+
+def _counts_in_domain(file: ModelFile) -> list[str]:
+    """Initializer of the range of calculated ints, if one may have no value."""
+    counts = file.calculated_counts
+    if all(c_undefined.missing(file, v.kind, v.value) is None for v in counts):
+        return []
+    first = file.fields.count(counts[0].name)
+    begin = f"offsetof(struct equations_values, {first})"
+    return [f".counts = {{{begin}, {len(counts)} * sizeof(int)}},"]
 
 
 def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
@@ -343,6 +357,8 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, Any]:
     for v in file.calculated_counts:
         field = file.fields.count(v.name)
         of = count(outputs, v.kind, v.value)
+        if v.kind == CONDITION and (unknown := graph.unknown(v.value)) is not None:
+            of = "if", outputs.of(unknown), "MODEL_NO_INT", of
         outputs.statements.append(store(field_of("to", field, field), of))
     first, second = of_both(
         Code(leaves(file), names=names), *targets.values(), "second", "return STATUS_OK;"

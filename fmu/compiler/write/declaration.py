@@ -329,8 +329,9 @@ def _entries_of_count(variable: Variable, file: ModelFile) -> dict[str, object]:
     kind, is_calculated = variable.kind, variable.leaf is None
     leaf: Leaf = ("" if is_calculated else variable.leaf.op, variable.name)
     variability = "discrete"
-    if variable.section == OPTIONS:
-        variability = "fixed" if leaf in _fixed(file) else "tunable"
+    if variable.section in (OPTIONS, FOLLOWS):
+        leaves = variable.value.leaves if is_calculated else {leaf}
+        variability = "fixed" if leaves <= _fixed(file) else "tunable"
     entries: dict[str, object] = {
         "field": file.fields.count(variable.name),
         "type": TYPES.get(kind, "enumeration") if isinstance(kind, str) else "enumeration",
