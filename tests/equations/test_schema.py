@@ -17,7 +17,7 @@ from jsonschema import Draft202012Validator
 
 from rparm import schemas
 from rparm.runs import inputs, scenario
-from rparm.systems import loop_file
+from rparm.systems import sections
 from tests.campaign.test_campaign_file import MISTAKES as OF_CAMPAIGNS
 from tests.campaign.test_campaign_file import wrong
 from tests.closed_loop.test_loop_file import TABLES as OF_LOOPS
@@ -75,7 +75,7 @@ def test_files_of_the_project_are_valid(kind: str) -> None:
         assert [f"{path.name}: {error.json_path}: {error.message}" for error in found] == []
 
 
-@pytest.mark.parametrize(("kind", "reader"), [("scenario", scenario), ("loop", loop_file)])
+@pytest.mark.parametrize(("kind", "reader"), [("scenario", scenario), ("loop", sections)])
 def test_keys_are_those_that_the_reader_takes(kind: str, reader: ModuleType) -> None:
     schema = json.loads(schemas.text(kind))
     assert set(schema["properties"]) == {*reader.REQUIRED, *reader.OPTIONAL}
