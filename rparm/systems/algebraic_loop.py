@@ -47,6 +47,13 @@ class AlgebraicLoop:
         """
         _Search(self, values, now, when).run()
 
+    def place(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return what the next search depends on beside the inputs, for `go_to`."""
+        return self.largest.copy(), self.solved
+
+    def go_to(self, largest: np.ndarray, solved: np.ndarray | None) -> None:
+        self.largest[:], self.solved = largest, solved
+
 
 class _Search:
     def __init__(

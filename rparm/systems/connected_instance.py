@@ -99,6 +99,14 @@ class ConnectedInstance:
             passed = (end - self.start + (0.5 + ROUNDING) * length) / self.every
             self.ticks = max(self.ticks, np.floor(passed))
 
+    def place(self) -> tuple[float, float, np.ndarray, np.ndarray]:
+        """Return where it is beside the state of its FMU, for `go_to`."""
+        return self.time, self.ticks, self.kept.copy(), self.inputs.view.copy()
+
+    def go_to(self, time: float, ticks: float, kept: np.ndarray, inputs: np.ndarray) -> None:
+        self.time, self.ticks = time, ticks
+        self.kept[:], self.inputs.view[:] = kept, inputs
+
     # ---- Values ----------------------------------------------------------------------------------
 
     def keep(self, values: np.ndarray, slopes: np.ndarray) -> None:

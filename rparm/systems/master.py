@@ -71,8 +71,9 @@ class SystemSnapshot(AbstractContextManager["SystemSnapshot"]):
         for component, state in zip(master.components.values(), self._states, strict=True):
             with component.instance.explained(self._when()):
                 state.take()
-        places = [(c.time, c.ticks, c.kept.copy()) for c in master.components.values()]
-        self._kept = master.time, master.values.copy(), master.slopes.copy(), places
+        places = [c.place() for c in master.components.values()]
+        solved = [loop.place() for loop in master.loops]
+        self._kept = master.time, master.values.copy(), master.slopes.copy(), places, solved
 
     def restore(self) -> None:
         """Bring the system back to the state kept, as often as wanted."""
@@ -80,9 +81,11 @@ class SystemSnapshot(AbstractContextManager["SystemSnapshot"]):
         for component, state in zip(master.components.values(), self._states, strict=True):
             with component.instance.explained(self._when()):
                 state.restore()
-        master.time, master.values[:], master.slopes[:], places = self._kept
+        master.time, master.values[:], master.slopes[:], places, solved = self._kept
         for component, place in zip(master.components.values(), places, strict=True):
-            component.time, component.ticks, component.kept[:] = place
+            component.go_to(*place)
+        for loop, place in zip(master.loops, solved, strict=True):
+            loop.go_to(*place)
 
     def _when(self) -> str:
         return f"at the communication point t = {self._master.time!r} s"
@@ -207,7 +210,7 @@ class Master(AbstractContextManager["Master"]):
             )  # fmt: skip
             first += len(outputs[name])
         self._groups = [[self.components[name] for name in group] for group in groups]
-        self._loops = [self._loop(circle) for circle in circles]
+        self.loops = [self._loop(circle) for circle in circles]
         self.due = list(self.components.values())  # that the last step has brought to its end
 
     def _loop(self, circle: Sequence[Connection]) -> AlgebraicLoop:
@@ -275,7 +278,7 @@ class Master(AbstractContextManager["Master"]):
 
     def _solve(self, components: Sequence[ConnectedInstance], when: str) -> None:
         """Solve the algebraic loops of components at this time."""
-        for loop in self._loops:
+        for loop in self.loops:
             loop.solve(self.values, components, when)
 
     def _follow(self) -> None:

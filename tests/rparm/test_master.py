@@ -183,8 +183,13 @@ def test_an_algebraic_loop_without_solution_is_named(oscillator: Fmu) -> None:
 
 
 @pytest.mark.parametrize("inputs", ["held", "extrapolated"])
-def test_going_back_repeats_bit_for_bit(oscillator: Fmu, inputs: str) -> None:
-    with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
+@pytest.mark.parametrize("ends", [RING, LOOPED], ids=["ring", "loop"])
+def test_going_back_repeats_bit_for_bit(
+    oscillator: Fmu, inputs: str, ends: list[Connection]
+) -> None:
+    fmus, rates = {"a": oscillator, "b": oscillator}, {"b": 0.05}
+    with Master(fmus, ends, "gauss_seidel", inputs, rates=rates) as master:
+        master.initialize(0.0, None, PARAMETERS)
         master.advance(0.1)
         with SystemSnapshot(master) as snapshot:
             snapshot.take()
