@@ -39,13 +39,13 @@ class ConnectedInstance:
         self.instance, self.every = instance, every
         self.time, self.ticks = 0.0, 0.0  # of its last communication point, s, and their number
         self.sources = np.array(sources, dtype=int)
-        self.ahead = np.array(ahead, dtype=bool)
+        self.ahead, self.has_ahead = np.array(ahead, dtype=bool), any(ahead)
         self.first, self.end = first, first + len(outputs)  # among the values
         memory = (c_double * len(outputs)).from_buffer(values, first * sizeof(c_double))
         self.outputs = instance.reals(outputs, memory)
         self.inputs = instance.reals(inputs)
         self.kept = np.zeros((2, len(inputs)))  # their sources and slopes as its step began
-        self.on_loop = np.zeros(len(inputs), dtype=bool)  # inputs that loops solve for
+        self.on_loop, self.solves = np.zeros(len(inputs), dtype=bool), False  # solved for by loops
 
         # slopes: of the FMU, else of the line through the last two values
         model = instance.fmu.model
@@ -109,9 +109,11 @@ class ConnectedInstance:
 
     # ---- Values ----------------------------------------------------------------------------------
 
-    def keep(self, values: np.ndarray, slopes: np.ndarray) -> None:
+    def keep(self, values: np.ndarray, slopes: np.ndarray | None) -> None:
         """Keep what feeds it at the beginning of its step: the system's values and slopes."""
-        self.kept[:] = values[self.sources], slopes[self.sources]
+        self.kept[0] = values[self.sources]
+        if slopes is not None:
+            self.kept[1] = slopes[self.sources]
 
     def renew(self, values: np.ndarray, slopes: np.ndarray) -> None:
         """Keep the newest of the sources ahead, in place of what they were."""
@@ -128,7 +130,10 @@ class ConnectedInstance:
 
         Their sources are equal but for rounding, which the gain of a loop would amplify.
         """
-        self.set_inputs(np.where(self.on_loop, self.inputs.view, values[self.sources]))
+        fed = values[self.sources]
+        if self.solves:
+            fed[self.on_loop] = self.inputs.view[self.on_loop]
+        self.set_inputs(fed)
 
     def set_lines(self, length: float) -> None:
         """Set the inputs over a step as the lines that are kept.
@@ -145,7 +150,7 @@ class ConnectedInstance:
 
     def end_lines(self, length: float) -> None:
         """Set where these lines end, for an FMU that takes no slopes and for algebraic loops."""
-        if len(self.sources) and (self._lines is None or self.on_loop.any()):
+        if len(self.sources) and (self._lines is None or self.solves):
             values, slopes = self.kept
             self.set_inputs(values + length * slopes)
 

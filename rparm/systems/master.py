@@ -211,7 +211,9 @@ class Master(AbstractContextManager["Master"]):
             first += len(outputs[name])
         self._groups = [[self.components[name] for name in group] for group in groups]
         self.loops = [self._loop(circle) for circle in circles]
-        self.due = list(self.components.values())  # that the last step has brought to its end
+        self._all = list(self.components.values())
+        self._has_rates = any(component.every is not None for component in self._all)
+        self.due = self._all  # that the last step has brought to its end
 
     def _loop(self, circle: Sequence[Connection]) -> AlgebraicLoop:
         rank = {name: i for i, name in enumerate(self.components)}
@@ -239,7 +241,7 @@ class Master(AbstractContextManager["Master"]):
                 known = ", ".join(self.components)
                 raise UserError(f"{name}: no such component (there are: {known})")
         self.time = self._start = start
-        self.due = list(self.components.values())
+        self.due = self._all
         self._drive()
         for component in self.due:
             component.begin(start, stop, parameters.get(component.name, {}))
@@ -267,7 +269,7 @@ class Master(AbstractContextManager["Master"]):
                 return
             before = self.values.copy()
             for component in self.due:
-                if not component.on_loop.any():
+                if not component.solves:
                     with component.instance.explained(when):
                         component.set_inputs(self.values[component.sources])
         names = ", ".join([*(self.names[i] for i in changing), *switched])
@@ -331,23 +333,24 @@ class Master(AbstractContextManager["Master"]):
     def advance(self, end: float) -> None:
         """Make one step to the time `end`, s; components of other rates do when theirs ends."""
         length = end - self.time
-        for component in self.components.values():
+        for component in self._all:
             if component.time == self.time:
-                component.keep(self._at(self.time), self.slopes)
-        self.due = [c for c in self.components.values() if c.is_due(end, length)]
+                component.keep(self._at(self.time), self.slopes if self.extrapolates else None)
+        if self._has_rates:
+            self.due = [c for c in self._all if c.is_due(end, length)]
         for group in self._groups:
-            stepping = [component for component in group if component in self.due]
-            before = [(component.outputs.view.copy(), component.time) for component in stepping]
+            stepping = [c for c in group if c in self.due] if self._has_rates else group
+            before = [(c.outputs.view.copy(), c.time) for c in stepping if self.extrapolates]
             for component in stepping:
-                component.renew(self._at(component.time), self.slopes)
+                if component.has_ahead:
+                    component.renew(self._at(component.time), self.slopes)
                 self._step(component, end)
             for component in stepping:
                 self._read(component, end)
                 component.ended(end, length)
             self._solve(stepping, f"at t = {end!r} s")
-            if self.extrapolates:
-                for component, (values, begin) in zip(stepping, before, strict=True):
-                    component.draw_slopes(values, end - begin)
+            for component, (values, begin) in zip(stepping, before, strict=False):
+                component.draw_slopes(values, end - begin)
         self.time = end
         self._drive()
         if self._transfer_switches():
@@ -520,7 +523,7 @@ def run_in_master(
             try:
                 if row:
                     master.advance(end)
-                    rows[row] = rows[row - 1]
+                    rows[row] = rows[row - 1]  # of components that are within a step
                 for reader in readers:
                     component = reader.component
                     if component not in master.due:
