@@ -91,13 +91,6 @@ def components(graph: Graph, vector: Value, count: int) -> list[Value]:
     return [component(graph, vector, i) for i in range(count)]
 
 
-def count_of(graph: Graph, vector: Value) -> int:
-    """Return how many results a vector has."""
-    if vector.op == "linear":
-        return len(vector.arguments) - 1
-    return len(graph.systems[vector.name].unknowns)
-
-
 def replaced(graph: Graph, roots: Iterable[Value], by: Mapping[Value, Value]) -> list[Value]:
     """Return values in which others stand for some of what they follow from; numbers folded."""
     roots, found = [*roots], {}
