@@ -186,9 +186,14 @@ def do_ssp(options: argparse.Namespace) -> Ended:
         with written(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             needed = ssp_writer.write(path, opened)
-        inputs = list(opened.system.inputs)
+        system, inputs = opened.system, list(opened.system.inputs)
     unread = "inputs of the system, which Ecos and libcosim do not load"
     notes = [f"{unread}: {', '.join(inputs)}"] if inputs else []
+    if system.order != "jacobi":
+        notes.append(f"order {system.order}: an annotation that only rparm reads")
+    if system.rates:
+        rates = f"rates of {', '.join(system.rates)}"
+        notes.append(f"{rates}: annotations of OSP, since SSP has no rates")
     console.messages(str(path), [*opened.notes, *notes])
     document = {"file": path.absolute(), "inputs": inputs, "needs": needed}
     lacks = [f"how {', '.join(inputs)} move{'s' * (len(inputs) == 1)}"] if inputs else []

@@ -297,6 +297,8 @@ def test_subsystems_are_drawn_saved_and_built(
     file.write_text(whole, encoding="utf-8")
     with opened(file) as system:
         assert system.system.subsystems == ("left", "right")
+        code, _, said = console("ssp", file, "--output", tmp_path)
+        assert code == 0 and "order gauss_seidel: an annotation" in said
         assert any(
             "subsystem left, right: its file's order does not apply" in note
             for note in system.notes
