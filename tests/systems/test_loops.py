@@ -282,6 +282,11 @@ def test_the_whole_is_in_place_of_its_subsystems(folder: Path) -> None:
         file.write_text(head + more, encoding="utf-8")
         found = rparm.System(file).run()
         assert (found["b.g.z"][0], found["b.h.z"][0]) == (g, h)
+    given = 'b = { file = "in.toml", parameters = { g.k = 1.0, "h.k" = 3.0 } }'
+    file.write_text(head.replace('b = "in.toml"', given) + "[parameters]\nb.h.k = 2.0\n", "utf-8")
+    built = building.build(file, output=folder, lock=False)
+    for values in (rparm.System(file).run(), rparm.simulate(built[0], stop_time=1.0)):
+        assert values["b.h.z"][0] == 9.0
 
 
 def test_subsystems_are_drawn_saved_and_built(

@@ -83,11 +83,14 @@ def of_loop(tables: Mapping[str, Any]) -> dict[str, Any]:
         raise ModelFileError(f"[components]: expected a table, got {shown(files)}")
     if missing := given.keys() - files.keys():
         raise ModelFileError(f"[parameters]: no component {min(missing)!r}")
-    found["components"] = {
-        name: (file if isinstance(file, dict) else {"file": file})
-        | {"parameters": given.get(name, {})}
-        for name, file in files.items()
-    }
+    found["components"] = {}
+    for name, entry in files.items():
+        table = entry if isinstance(entry, dict) else {"file": entry}
+        own = table.get("parameters", {})
+        if isinstance(own, dict):
+            with placed("[components]", name, "parameters"):
+                own = flattened(own) | given.get(name, {})
+        found["components"][name] = table | {"parameters": own}
     return found | {"connections": tables.get("connections", {})}
 
 
