@@ -200,5 +200,10 @@ def _simulated(
             return comparison.simulate(section.ssp, name, reference, engine, progress)
     estimates = not comparison.why_no_estimate(section.ssp)
     with Progress(name, 5 * steps if estimates else steps) as progress:
-        outcome = comparison.run_alone(section.ssp, name, section.names, engine, progress)
+        try:
+            outcome = comparison.run_alone(section.ssp, name, section.names, engine, progress)
+        except UserError:
+            if engine is ecos.run:  # it goes on where an FMU of FMI 3.0 ends the simulation
+                master.run_in_master(section.ssp, name, section.names)
+            raise
     return comparison.with_exact(outcome, section.ssp, section.names) if exact else outcome

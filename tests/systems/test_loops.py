@@ -1,6 +1,7 @@
 """Algebraic loops of FMUs, subsystems, rates and orders, as a user meets them."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -325,3 +326,20 @@ def test_subsystems_are_drawn_saved_and_built(
     )
     error = console.refused("build", file, "--output", tmp_path)
     assert "every: a rate is for co-simulation" in error
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_component_that_ends_the_simulation_says_why(
+    tmp_path: Path, console: Console, version: int
+) -> None:
+    """x' = -x, from 1: at ln 2."""
+    decay = 'name = "Decay"\n[states]\nx = { start = 1, derivative = "-x" }\n[events.half]\n'
+    decay += 'when = "x < 0.5"\nterminate = "half is gone"\n'
+    (tmp_path / "decay.toml").write_text(decay, encoding="utf-8")
+    file = tmp_path / "ends.toml"
+    file.write_text('name = "E"\nstep = 0.1\nstop = 1\n[components]\na = "decay.toml"\n', "utf-8")
+    _, _, said = console("system", file, "--fmi", version, "--output", tmp_path / "report")
+    assert re.search(r"ends the simulation at t = 0\.693147.*: event half: half is gone", said)
+    text = decay.replace("is gone", "is {gone}")
+    (tmp_path / "decay.toml").write_text(text, encoding="utf-8")
+    assert "[events.half]: terminate: {gone}: no such variable" in console.refused("system", file)

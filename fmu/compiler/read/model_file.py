@@ -8,6 +8,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from ..expressions.expression import RELATIONS, Node, derivative_of, written
+from ..expressions.hints import meant
 from ..expressions.kinds import CONDITION
 from ..graph import algebraic
 from ..graph.algebraic import UNKNOWN
@@ -24,6 +25,7 @@ from .content import (
     COUNTS,
     FOLLOWS,
     OPTIONS,
+    PLACEHOLDER,
     SWITCHES,
     Block,
     Expression,
@@ -111,6 +113,12 @@ def read(path: Path) -> ModelFile:
             with file_reader.located(path, file.text), placed(variable.place, variable.name):
                 what = f"is for what only events change, but {moving[0]} moves"
                 raise ModelFileError(f'variability: "{variable.variability}" {what}')
+    for event in file.events:
+        for name in PLACEHOLDER.findall(event.terminate):
+            with file_reader.located(path, file.text), placed(f"[events.{event.name}]"):
+                if name not in file.variables:
+                    way_out = meant(name, file.variables)
+                    raise ModelFileError(f"terminate: {{{name}}}: no such variable{way_out}")
     own = {state.value: f"der_{state.name}" for state in reversed(file.of("states"))}
     own |= {variable.value: variable.name for variable in reversed(file.calculated)}
     graph.names |= {value: name for value, name in own.items() if value.arguments}
