@@ -119,9 +119,7 @@ static enum status assign(const struct call *call, int number, const struct even
     }
     int *counts = call->segments + model->segment_count;
     const size_t counts_size = (size_t)model->count_count * sizeof *counts;
-    if (call->room.counted != NULL) {
-        memcpy(call->room.counted, counts, counts_size);
-    }
+    memcpy(call->room.counted, counts, counts_size);
     if (number >= 0) {
         model->change(call->values, call->t, relations_later(call->t, call->error), number,
                       call->room.tolerance);
@@ -140,9 +138,7 @@ static enum status assign(const struct call *call, int number, const struct even
     if (refused == NULL) {
         return check_counts(call, event);
     }
-    if (call->room.counted != NULL) {
-        memcpy(counts, call->room.counted, counts_size);
-    }
+    memcpy(counts, call->room.counted, counts_size);
     return refuse(call, event, refused);
 }
 

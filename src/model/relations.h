@@ -121,8 +121,8 @@ struct relations_room {
     int *turned;                        /* one per relation; zeros */
     double *tolerance;                  /* one per state */
     double *assigned;                   /* one per assignment */
+    int *counted;                       /* one per count */
     const double *zeros;                /* one per state and input */
-    int *counted;                       /* one per count; NULL: no new value reads an index */
 };
 
 static inline const int *relations_modes(const struct relations *model, const void *values) {

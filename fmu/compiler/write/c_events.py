@@ -301,18 +301,11 @@ class Events:
                 for line in self._change(i, change)
             ],
             **c_undefined.parts(file, self.leaves, in_domain),
-            counted=", (int[COUNTS + 1]){0}" if self._reads_elements() else "",
             descriptions=self._describe(),
             names=", ".join(
                 [text(file.relation_texts[places[r.name]][:100]) for r in self.located] or ["NULL"]
             ),
         ).splitlines()
-
-    def _reads_elements(self) -> bool:
-        """Whether new values may read indexes that the change sets: messages name those read."""
-        changes = [*self.file.events, *self.file.sampled]
-        given = (expression for change in changes for expression in change.given.values())
-        return any("element" in expression.value.functions for expression in given)
 
     def _is_known(self) -> dict[str, list[str]]:
         """Whether indicators that are not finite miss a solution: others may miss a branch."""
