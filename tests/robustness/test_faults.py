@@ -180,7 +180,7 @@ def test_no_room_for_errors(place: Place, unbuffered: str) -> None:
 
 def test_names_that_the_output_cannot_encode(tmp_path: Path) -> None:
     for part in ("rparm", "fmu/compiler"):
-        shutil.copytree(ROOT / part, tmp_path / part)
+        shutil.copytree(ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns("__pycache__"))
     model = tmp_path / "models" / "m"
     (model / "scenarios").mkdir(parents=True)
     text = (

@@ -209,8 +209,9 @@ def test_an_fmu_without_what_is_compared(
     """It must not pass because there is nothing to compare."""
     path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: change})
     command = [sys.executable, "-m", "rparm", "run", SCENARIO, "--fmu", str(path)]
-    shutil.copytree(ROOT / "rparm", tmp_path / "rparm")
-    shutil.copytree(ROOT / "fmu" / "compiler", tmp_path / "fmu" / "compiler")
+    ignored = shutil.ignore_patterns("__pycache__")  # other tests write there
+    shutil.copytree(ROOT / "rparm", tmp_path / "rparm", ignore=ignored)
+    shutil.copytree(ROOT / "fmu" / "compiler", tmp_path / "fmu" / "compiler", ignore=ignored)
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert message in done.stderr and done.stderr.count("\n") == 1
