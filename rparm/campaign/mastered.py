@@ -7,9 +7,8 @@ import numpy as np
 
 from rparm.campaign.job import Job
 from rparm.fmi.fmu_file import Fmu
-from rparm.systems.feedthrough import sequence
-from rparm.systems.master import Master
-from rparm.systems.structure import WAYS
+from rparm.systems.master import Master, in_order
+from rparm.systems.structure import WAYS, split
 
 
 @dataclass(frozen=True)
@@ -42,15 +41,13 @@ def run(
         for inputs, rows in ((job.reals, held), (job.switches, job.switches.values))
         for name, column in zip(inputs.names, rows.T, strict=True)
     }
-    order, connections = job.wiring.order, job.wiring.connections
-    names = list(models)
-    if order == "gauss_seidel":
-        names = sequence(names, connections, models)
-    archives = {component.name: component.archive for component in job.components}
-    also = [_split(name, names) for name in job.watched]
+    order, inputs = WAYS[job.wiring.order]
+    connections = job.wiring.connections
+    own = {component.name: fmus[component.archive] for component in job.components}
     with Master(
-        {name: fmus[archives[name]] for name in names}, connections, *WAYS[order],
-        also=also, signals=signals, rates=job.wiring.rates,
+        in_order(own, connections, order), connections, order, inputs,
+        also=[split(name, models) for name in job.watched],
+        signals=signals, rates=job.wiring.rates,
     ) as master:  # fmt: skip
         master.initialize(job.start, job.stop, values)
         columns = [master.names.index(name) for name in job.watched]
@@ -61,8 +58,3 @@ def run(
         components = [master.components[component.name] for component in job.components]
         found = [components[c].instance.integer(v) for c, v in job.integers.values()]
     return [value for value in found if value is not None]
-
-
-def _split(name: str, components: list[str]) -> tuple[str, str]:
-    component = max((c for c in components if name.startswith(f"{c}.")), key=len)
-    return component, name[len(component) + 1 :]

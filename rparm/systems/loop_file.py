@@ -7,7 +7,7 @@ it; then a system is the same as one in an SSP.
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -114,7 +114,8 @@ class LoopReader(Sections):
             subsystems=tuple(given.subsystems),
         )  # fmt: skip
         check(self.path, system, self.models)
-        system = self.with_inputs(system, self.moved)
+        solved = on_loops(system.connections, self.models)
+        system = self.with_inputs(system, self.moved, solved)
         keep = None
         if KEEP in content:
             keep = tuple(map(self.kept, self.array(content[KEEP], KEEP, "component.variable")))
@@ -124,7 +125,7 @@ class LoopReader(Sections):
         return OpenedSystem(
             self.path, self.folder, system, self.models, files=self.files, python=self.python,
             version=self.version, read=self.read,
-            solved=on_loops(system.connections, self.models),
+            solved=solved,
         )  # fmt: skip
 
     # ---- Names -----------------------------------------------------------------------------------
@@ -281,11 +282,15 @@ class LoopReader(Sections):
 
     # ---- Inputs ----------------------------------------------------------------------------------
 
-    def with_inputs(self, system: System, given: Mapping[str, Any]) -> System:
-        """Add inputs from outside; constants are parameters of all variants that give no other."""
+    def with_inputs(
+        self, system: System, given: Mapping[str, Any], solved: Collection[str]
+    ) -> System:
+        """Add inputs from outside; constants are parameters of all variants that give no other.
+
+        Those `solved`, on algebraic loops, may have values though they are connected.
+        """
         known: dict[str, Variable] = {}
         fed = {c.end: c.start for c in system.connections}
-        solved = on_loops(system.connections, self.models)
         for values in system.parameters.values():
             for name in (f"{component}.{x}" for component in values for x in values[component]):
                 if name in fed and name not in solved:

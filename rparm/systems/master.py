@@ -473,6 +473,16 @@ def ways(models: Mapping[str, Model], connections: Iterable[Connection]) -> list
     return [(order, inputs) for inputs in INPUT_MODES[: 1 + can] for order in ORDERS]
 
 
+def in_order(
+    fmus: Mapping[str, Fmu], connections: Iterable[Connection], order: str
+) -> Mapping[str, Fmu]:
+    """Return components as they step: in Gauss-Seidel order sorted by direct feedthrough."""
+    if order == "jacobi":
+        return fmus
+    models = {name: fmu.model for name, fmu in fmus.items()}
+    return {name: fmus[name] for name in sequence(fmus, connections, models)}
+
+
 def beyond_steps(system: System, models: Mapping[str, Model]) -> str:
     """Say what a system has more than steps side by side, or nothing."""
     if system.order != "jacobi":
@@ -491,11 +501,8 @@ def master_of(
     """Return the master of a system, as its file orders or in a `way`: its order and inputs."""
     system = ssp.system
     order, inputs = way or WAYS[system.order]
-    names = list(fmus)
-    if order != "jacobi":
-        names = sequence(names, system.connections, ssp.models)
     return Master(
-        {name: fmus[name] for name in names}, system.connections, order, inputs,
+        in_order(fmus, system.connections, order), system.connections, order, inputs,
         signals=system.inputs, rates=system.rates,
     )  # fmt: skip
 
