@@ -10,6 +10,33 @@ static const double location_error = 1e-11;
 static const double shortest_period = 1e-12;  // s, of samplers
 static const double part_of_period = 0x1p-40; // that counts as rounding
 
+/* Decides contacts, and relations with them, until none of them changes. */
+static enum status follow_contacts(const struct call *call, const struct event *event,
+                                   bool is_first, bool is_start, bool *changes) {
+    enum { MOST_ROUNDS = 20 };
+    const struct relations *model = call->model;
+    const bool is_read = model->relation_count > 0 || model->segment_count > 0;
+    enum status status = STATUS_OK;
+    bool differs = model->contacts != NULL;
+    for (int count = 0; differs && status == STATUS_OK && count < MOST_ROUNDS; count++) {
+        differs = false;
+        status = contacts_update(call, event, is_first && count == 0, is_start, &differs);
+        if (differs && status == STATUS_OK && is_read) {
+            modes_settle(call);
+        }
+        *changes |= differs;
+        differs = differs && is_read;
+    }
+    if (differs && status == STATUS_OK) {
+        if (event != NULL && event->reason != NULL) {
+            (void)snprintf(event->reason, event->reason_size,
+                           "friction or stops and conditions change each other without end");
+        }
+        return STATUS_INTERNAL;
+    }
+    return status;
+}
+
 const void *relations_followed(const struct relations *model, struct relations_room room,
                                const void *values, double t, void *copy) {
     const int is_begun = *relations_modes(model, values);
@@ -25,6 +52,7 @@ const void *relations_followed(const struct relations *model, struct relations_r
         modes_follow_inputs(&call);
     } else {
         modes_begin(&call);
+        (void)follow_contacts(&call, NULL, false, false, &(bool){false});
     }
     return copy;
 }
@@ -380,6 +408,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
         modes_begin(&call);
         *call.is_begun = 1;
     }
+    enum status status = STATUS_OK;
     set_time(&call, event);
     for (int i = 0; i < model->state_count; i++) {
         const double located = location_error * (model->nominal[i] + fabs(x[i]));
@@ -390,10 +419,17 @@ enum status relations_update(const struct relations *model, struct relations_roo
     } else if (model->sampler_count > 0) {
         modes_settle(&call);
     }
-    enum status status = run_samplers(&call, event);
+    bool changes = false;
+    if (!was_begun) {
+        status = follow_contacts(&call, event, true, true, &changes);
+    }
+    status = status == STATUS_OK ? run_samplers(&call, event) : status;
     bool fires = true;
     for (int count = 0; status == STATUS_OK && fires && count <= event->max_events; count++) {
         status = run_due_events(&call, event, count == event->max_events, &fires);
+        if (status == STATUS_OK && (was_begun || fires)) {
+            status = follow_contacts(&call, event, was_begun && count == 0, false, &fires);
+        }
     }
     const int wrong = status == STATUS_OK && !fires ? modes_contradiction(&call) : -1;
     if (wrong >= 0) {

@@ -6,6 +6,7 @@
  * (offset + k every), k = 0, 1, ...; with a period of 0 it never does. */
 #pragma once
 
+#include "contacts.h"
 #include "model.h"
 
 #include <float.h>
@@ -88,6 +89,7 @@ struct relations {
     const char *const *every_names;  /* of the period of each sampler */
     const struct assignment *assignment;
     int assignment_count;
+    const struct contacts *contacts; /* NULL: none; `compare` writes their limits behind relations */
 
     /* Writes the start values of modes, and of states and discrete variables that follow from
      * parameters. NULL if there are none. */
@@ -113,7 +115,7 @@ struct relations {
 
 /* Memory for one call. */
 struct relations_room {
-    struct compared *compared, *before; /* one per relation each */
+    struct compared *compared, *before; /* one per relation and two per contact each */
     double *times;                      /* one per relation */
     double *every, *offset;             /* one per sampler */
     int *segment;                       /* one per segment */
@@ -123,6 +125,7 @@ struct relations_room {
     double *assigned;                   /* one per assignment */
     int *counted;                       /* one per count */
     const double *zeros;                /* one per state and input */
+    struct contacts_room contacts;
 };
 
 static inline const int *relations_modes(const struct relations *model, const void *values) {

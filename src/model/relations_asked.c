@@ -41,6 +41,11 @@ void relations_errors(const struct relations *model, struct relations_room room,
             errors[model->relation[k].indicator] = isfinite(noise) ? noise : 0.0;
         }
     }
+    const struct compared *limit = room.compared + model->relation_count;
+    for (int i = 0; model->contacts != NULL && i < 2 * model->contacts->contact_count; i++) {
+        errors[model->contacts->indicator + (size_t)i] =
+            isfinite(limit[i].noise) ? limit[i].noise : 0.0;
+    }
 }
 
 /* True if the number is a count of ticks. */

@@ -21,6 +21,7 @@ from ..expressions.expression import RANDOM, RELATIONS, Node, in_order
 from ..expressions.parser import parse
 from . import algebraic, undefined
 from .algebraic import GIVEN, UNKNOWN, Linear, System
+from .contacts import Contacts
 from .tables import FAR, LookupTable
 
 ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
@@ -141,6 +142,7 @@ class Graph:
     of_inputs: dict[Value, bool] = field(default_factory=dict)  # of distances
     systems: dict[str, System] = field(default_factory=dict)  # by name
     linear: list[Linear] = field(default_factory=list)  # systems of the file
+    contacts: Contacts | None = None
     has_switches: bool = True  # else relations are evaluated with the values
     has_times: bool = False  # without switches: relations of the time with constants are some
     is_guarded: bool = True  # else an infinite slope makes derivatives infinite, as in C

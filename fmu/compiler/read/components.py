@@ -25,6 +25,7 @@ from .content import (
     PLACEHOLDER,
     SWITCHES,
     Change,
+    Contact,
     Element,
     Event,
     Expression,
@@ -43,7 +44,7 @@ RUN = (".fmu", ".ssp", ".py")  # files that only `system` takes
 MOST_LEVELS = 20
 FREE = ("time", *CONSTANTS)  # names that every file has
 QUANTITY = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
-OF_CHANGE = re.compile(r"\[(sampled|events)\.(.+)\]")
+OF_CHANGE = re.compile(r"\[(sampled|events|friction|stops)\.(.+)\]")
 
 
 def flattened(table: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
@@ -206,6 +207,7 @@ class Components:
         file.modes |= {names.of(mode): start for mode, start in part.modes.items()}
         file.sampled += map(names.change, part.sampled)
         file.events += map(names.change, part.events)
+        file.contacts += map(names.contact, part.contacts)
         file.happening |= {names.of(name): kind for name, kind in part.happening.items()}
         for message, condition in part.checks:
             text = f"{prefix}: {names.message(message)}"
@@ -341,6 +343,10 @@ class _Prefix:
         if isinstance(new, Event):
             new.terminate = self.message(new.terminate)
         return new
+
+    def contact(self, given: Contact) -> Contact:
+        texts = {key: self.expression(expression) for key, expression in given.given.items()}
+        return Contact(self.of(given.name), given.is_friction, self.of(given.force), texts)
 
     def expression(self, given: Expression) -> Expression:
         new = copy(given)

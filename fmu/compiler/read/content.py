@@ -22,6 +22,7 @@ from .code import CodeFile
 FOLLOWS = "calculated"  # section of parameters that follow from others
 # of parameters, inputs and discrete variables that are no real numbers
 ALGEBRAIC = "algebraic"  # unknowns of equations
+FORCES = "forces"  # unknowns of contacts
 OPTIONS, SWITCHES, COUNTS = "options", "switches", "counts"
 WRITTEN = {  # where files have them
     FOLLOWS: "parameters",
@@ -200,6 +201,20 @@ class Sampler(Change):
         return [self.every, self.offset]
 
 
+@dataclass(eq=False)
+class Contact:
+    """Dry friction or stops, which decide an unknown force."""
+
+    name: str  # with its section
+    is_friction: bool
+    force: str
+    given: dict[str, Expression]  # by key
+
+    def variable(self, key: str) -> str:
+        """Return the name of a variable that it has."""
+        return f"{self.name}.{key}"
+
+
 @dataclass(frozen=True)
 class Hook:
     """Events that C by hand decides, NAME_events; it sets all discrete variables."""
@@ -241,6 +256,7 @@ class ModelFile:
     variables: dict[str, Variable] = field(default_factory=dict)
     sampled: list[Sampler] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    contacts: list[Contact] = field(default_factory=list)
     checks: list[tuple[str, Expression]] = field(default_factory=list)  # messages and conditions
     terminals: dict[str, Terminal] = field(default_factory=dict)
     blocks: dict[Expression, Block] = field(default_factory=dict)  # by each of their expressions
@@ -350,6 +366,7 @@ class ModelFile:
         unknowns, *others = CALCULATED
         found = [v.expression for v in self.of(unknowns, others[0], "states", *others[1:])]
         found += [v.guess for v in self.of(*CALCULATED) if v.guess is not None]
+        found += [e for contact in self.contacts for e in contact.given.values()]
         return found + [expression for change in self.changes for expression in change.expressions]
 
     @property

@@ -16,7 +16,7 @@ from ..expressions.expression import ExpressionError, Node, in_order, with_names
 from ..expressions.kinds import CONDITION, NUMBER, WHOLE
 from ..expressions.parser import table_unit
 from ..units import ANGLE, BASE, Unit
-from . import functions, header, keys, terminals
+from . import contacts, functions, header, keys, terminals
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
 from .components import Components, check_loop, of_loop
@@ -101,7 +101,7 @@ def read_tables(
     parts = Components(file, read, (*above, path.resolve()))
     parts.take(head.get("components", {}))
     modes = head.get("modes", [])
-    entries = [*keys.SECTIONS, "sampled", "events"]
+    entries = [*keys.SECTIONS, "sampled", "events", *contacts.SECTIONS]
     if sum(len(head.get(section, {})) for section in entries) + len(modes) > keys.MOST_ENTRIES:
         raise ModelFileError(
             f"has more than {keys.MOST_ENTRIES} variables, modes, samplers and events"
@@ -124,6 +124,9 @@ def read_tables(
         _read_sampler(file, element)
     for element in _elements(file, "[events]", head.get("events", {}).items()):
         _read_event(file, element)
+    for section in contacts.SECTIONS:
+        for element in _elements(file, f"[{section}]", head.get(section, {}).items()):
+            contacts.read(file, section, element, _check_name)
     for message, condition in head.get("check", {}).items():
         _read_check(file, message, condition)
     parts.connect(head.get("connections", {}))

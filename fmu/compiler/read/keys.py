@@ -65,7 +65,8 @@ NOT_REAL = {"parameters": OPTIONS, "inputs": SWITCHES, "discrete": COUNTS}
 NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
     *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
-    *("functions", "sampled", "events", "check", "terminals", "hook", "components", "connections"),
+    *("functions", "sampled", "events", "friction", "stops", "check", "terminals", "hook"),
+    *("components", "connections"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
@@ -74,6 +75,8 @@ MEMBERS = ("signals", "inflows", "outflows")
 TERMINAL = ("rule", "description", *MEMBERS, "terminals")
 EVENT = ("when", "while", "where", "reinit", "set", "terminate")
 EFFECTS = ("set", "reinit", "terminate")
+FRICTION = ("force", "velocity", "coulomb", "breakaway", "stribeck", "while")
+STOPS = ("force", "position", "velocity", "lower", "upper", "restitution", "while")
 HOOK = ("sources", "indicators", "series", "reads", "reach")
 SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1

@@ -19,6 +19,7 @@ from ..expressions.indexes import with_elements
 from ..expressions.kinds import CONDITION, kind_of, with_kinds
 from ..expressions.parser import table_unit
 from ..units import BASE, Exponents, whole
+from . import contacts
 from .blocks import block, groups
 from .content import (
     ALGEBRAIC,
@@ -163,7 +164,8 @@ def _in_order(file: ModelFile) -> list[Expression]:
         variables += [v.expression for v in members]
     happening = [expression for change in file.changes for expression in change.expressions]
     constant = [e for e in [*file.constant, *file.initial] if e.target not in entries]
-    return [*variables, *happening, *constant, *file.checked]
+    of_contacts = [e for contact in file.contacts for e in contact.given.values()]
+    return [*variables, *of_contacts, *happening, *constant, *file.checked]
 
 
 def _add_block(file: ModelFile, members: list[Variable], found: Block) -> None:
@@ -227,13 +229,14 @@ def _check_units(file: ModelFile) -> None:
     for state in file.of("states"):
         unit = units[state.name]
         units[derivative_of(state.name)] = unit and times(unit, SECOND, -1)
+    of_contacts = contacts.add_units(file, units)
     for expression in file.order:
         if expression in file.blocks:
             _add_units(file, file.blocks[expression], units)
         if expression.is_checked:
             continue
         with placed(*expression.place):
-            expected = units.get(expression.target)
+            expected = of_contacts.get(expression, units.get(expression.target))
             if expression.is_rate:
                 expected = times(expected, SECOND, -1)
             try:

@@ -4,13 +4,14 @@ import math
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
 from ..expressions.expression import RELATIONS, Node, derivative_of, written
 from ..expressions.hints import meant
 from ..expressions.kinds import CONDITION
-from ..graph import algebraic
+from ..graph import algebraic, contacts
 from ..graph.algebraic import UNKNOWN
 from ..graph.graph import MOVING, Graph, Value
 from ..names import Fields, StructFields
@@ -24,6 +25,7 @@ from .content import (
     CALCULATED,
     COUNTS,
     FOLLOWS,
+    FORCES,
     OPTIONS,
     PLACEHOLDER,
     SWITCHES,
@@ -44,6 +46,7 @@ LEAVES = {
     OPTIONS: "integer",  # conditions are modes
     SWITCHES: "integer",
     COUNTS: "integer",
+    FORCES: UNKNOWN,
 }
 
 
@@ -107,6 +110,9 @@ def read(path: Path) -> ModelFile:
             known[derivative_of(expression.target)] = expression.value
         elif expression.target:
             known.setdefault(expression.target, expression.value)
+    if file.contacts:
+        with file_reader.located(path, file.text):
+            _solve_contacts(file)
     for variable in file.of(*CALCULATED):
         if variable.variability and variable.value.moves:
             moving = sorted(name or op for op, name in variable.value.leaves if op in MOVING)
@@ -228,6 +234,44 @@ class Blocks:
             [-math.inf if v.min is None else v.min for v in found],
             [math.inf if v.max is None else v.max for v in found],
         )
+
+
+def _solve_contacts(file: ModelFile) -> None:
+    """Put the forces of friction and stops in the place of their names."""
+    graph, states = file.graph, file.of("states")
+    found = [
+        contacts.Contact(
+            contact.name,
+            contact.is_friction,
+            graph.value(UNKNOWN, name=contact.force),
+            file.variables[contact.variable("mode")].leaf,
+            {key: expression.value for key, expression in contact.given.items()},
+        )
+        for contact in file.contacts
+    ]
+    before = {state.leaf: state.value for state in states}
+    try:
+        graph.contacts, _, shown, rates = contacts.Builder(graph, found, before).build()
+    except contacts.ContactError as error:
+        with placed(f"[{error.contact.name}]", error.key):
+            raise ModelFileError(str(error)) from None
+    by = shown | {old: rates[x] for x, old in before.items() if old.op != "state"}
+    expressions = [e for e in [*file.order, *file.initial] if hasattr(e, "value")]
+    values = algebraic.replaced(graph, [e.value for e in expressions], by)
+    for expression, value in zip(expressions, values, strict=True):
+        expression.value = value
+    for state in states:
+        state.expression.value = rates[state.leaf]
+    algebraic.put(graph, by, 0)
+    for system in graph.systems.values():
+        (system.solution,) = algebraic.replaced(graph, [system.solution], by)
+    vectors = algebraic.replaced(graph, [linear.vector for linear in graph.linear], by)
+    pairs = zip(graph.linear, vectors, strict=True)
+    graph.linear = [replace(linear, vector=vector) for linear, vector in pairs]
+    for contact in file.contacts:
+        force = file.variables[contact.force]
+        force.expression = file.variables[contact.variable("force")].expression
+        force.leaf = None
 
 
 def leaves(file: ModelFile, graph: Graph) -> dict[str, Value]:

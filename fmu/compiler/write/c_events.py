@@ -18,7 +18,7 @@ from ..names import Field, c_name
 from ..plain_c.values import Conditions
 from ..read.content import CALCULATED, COUNTS, SWITCHES, Change, ModelFile, Sampler
 from ..units import Exponents
-from . import c_undefined
+from . import c_contacts, c_undefined
 from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
@@ -152,7 +152,7 @@ def _has_starts(file: ModelFile) -> bool:
     return bool(file.started or any(file.modes.values()) or file.of(COUNTS))
 
 
-def _counted(file: ModelFile) -> dict[str, tuple[Kind, int]]:
+def counted(file: ModelFile) -> dict[str, tuple[Kind, int]]:
     """Modes and discrete variables that are no real numbers: kinds, and values at the start."""
     found = {mode: (CONDITION, int(start)) for mode, start in file.modes.items()}
     return found | {v.name: (v.kind, int(v.start or 0)) for v in file.of(COUNTS)}
@@ -170,7 +170,8 @@ class Events:
         for event in file.events:
             during = event.during and event.during.value
             read += [(event.when.value, during), *([(during, None)] if during else [])]
-        used = _guards(graph, read)
+        used = _guards(graph, [*read, *((value, None) for value in c_contacts.read(file))])
+        self.limits = c_contacts.limits(file)
         # condition under which each matters; None: always
         readers = {r.name: r.mode for r in self.relations}
         for segment in graph.segments.values():
@@ -195,7 +196,15 @@ class Events:
             z, used = self.signed(relation), self.used[relation.name]
             z = z if used is None else self.graph.value("if", used, z, one)
             found[Field("z", i)] = z
+        for i, limit in enumerate(self.limits, len(self.located)):
+            found[Field("z", i)] = c_contacts.indicator(self.file, limit)
         return found
+
+    @property
+    def followed(self) -> list[Value]:
+        """Distances of relations and limits, with the signs of modes."""
+        relations = [self.signed(relation) for relation in self.located]
+        return relations + [c_contacts.distance(self.file, limit) for limit in self.limits]
 
     def signed(self, relation: Relation) -> Value:
         """The distance, with the sign of the mode."""
@@ -219,7 +228,7 @@ class Events:
             *([f"int relations[{len(self.relations)}];"] if self.relations else []),
             f"int active[{len(self.file.events) + 1}];",
             *([f"int segments[{len(segments)}];"] if (segments := self.graph.segments) else []),
-            *declared("int", map(self.file.fields.count, _counted(self.file))),
+            *declared("int", map(self.file.fields.count, counted(self.file))),
         ]
 
     def functions(self, in_domain: str = "") -> list[str]:
@@ -259,8 +268,8 @@ class Events:
             + len(self.relations)
             + len(file.events)
             + len(file.graph.segments)
-            + len(_counted(file)),
-            counts=len(_counted(file)),
+            + len(counted(file)),
+            counts=len(counted(file)),
             count=self._counts() or ["{0},"],
             **self._segments(places),
             samplers=len(file.sampled),
@@ -283,8 +292,9 @@ class Events:
             starts=[".start = start,"] if _has_starts(file) else [],
             switches=self._switches(),
             starts_follow=[".starts_follow = true,"] if file.started else [],
-            located=len(self.located),
-            has_located=str(bool(self.located)).lower(),
+            located=len(self.located) + len(self.limits),
+            are_possible=self._are_possible(),
+            **c_contacts.parts(file, self.leaves),
             next_time=NEXT_TIME if timed or file.sampled else [],
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
@@ -303,7 +313,9 @@ class Events:
             **c_undefined.parts(file, self.leaves, in_domain),
             descriptions=self._describe(),
             names=", ".join(
-                [text(file.relation_texts[places[r.name]][:100]) for r in self.located] or ["NULL"]
+                [text(file.relation_texts[places[r.name]][:100]) for r in self.located]
+                + [text(limit.name) for limit in self.limits]
+                or ["NULL"]
             ),
         ).splitlines()
 
@@ -314,7 +326,7 @@ class Events:
         return {
             "is_solved": ["bool is_solved = true;"],
             "unless_solved": [
-                f"if (!is_solved && !relations_are_finite(indicator, {len(self.located)})) {{",
+                f"if (!is_solved && !relations_are_finite(indicator, {len(self.indicators())})) {{",
                 "    return STATUS_NOT_FINITE;",
                 "}",
             ],
@@ -368,7 +380,7 @@ class Events:
             elif rate is not zero:
                 conditions = []
                 break
-        if not conditions or self.located:
+        if not conditions or self.located or self.limits:
             return {"rest": [], "is_at_rest": []}
         code = Code(self.leaves)
         rests = code.of(reduce(partial(self.graph.value, "and"), dict.fromkeys(conditions)))
@@ -402,6 +414,9 @@ class Events:
             found = {"distance": code.of(distance), "slope": code.of(slope), "noise": error}
             found["used"] = "1" if used is None else code.of(used)
             stores += [store(Place("compared[", k, f"].{key}"), of) for key, of in found.items()]
+        distances = [c_contacts.distance(self.file, limit) for limit in self.limits]
+        slopes = graph.derivatives(distances, motion)
+        stores += c_contacts.compare(self.file, code, errors, slopes)
         code.statements += stores
         return code.lines()
 
@@ -429,10 +444,10 @@ class Events:
 
     def _rows_of_assignments(self) -> list[str]:
         """Rows of struct assignment."""
-        counted = _counted(self.file)
+        counts = counted(self.file)
         found = [(-1, v.name, v.initial) for v in self.file.started if v.is_real]
         for i, change in enumerate([*self.file.events, *self.file.sampled]):
-            found += [(i, n, e) for n, e in change.given.items() if n not in counted]
+            found += [(i, n, e) for n, e in change.given.items() if n not in counts]
         return [
             f"{{{i}, offsetof(struct equations_values, {self.file.fields.value(name)}), "
             f"{shortened(f'{name} = ', expression, self.file.tables)}}},"
@@ -448,9 +463,9 @@ class Events:
 
     def _starts(self) -> list[str]:
         new = {v.name: v.initial.value for v in self.file.started}
-        counted, code = _counted(self.file).items(), Code(self.leaves)
+        counts, code = counted(self.file).items(), Code(self.leaves)
         code.statements += [
-            *(store(field_of("values", self.file.fields.count(n)), k) for n, (_, k) in counted),
+            *(store(field_of("values", self.file.fields.count(n)), k) for n, (_, k) in counts),
             *self._assigned(code, new, is_single=len(new) == 1),
         ]
         return [
@@ -489,10 +504,10 @@ class Events:
 
         is_single: no other statement changes what these values follow from.
         """
-        counted, stores = _counted(self.file), []
+        counts, stores = counted(self.file), []
         for name, value in new.items():
-            if name in counted:
-                of, c_type = count(code, counted[name][0], value), "int"
+            if name in counts:
+                of, c_type = count(code, counts[name][0], value), "int"
                 field = self.file.fields.count(name)
             else:
                 of, c_type, field = code.of(value), "double", self.file.fields.value(name)
@@ -503,7 +518,7 @@ class Events:
     def _counts(self) -> list[str]:
         """Rows of struct count: name, smallest and largest value."""
         rows = []
-        for name, (kind, _) in _counted(self.file).items():
+        for name, (kind, _) in counted(self.file).items():
             is_item = isinstance(kind, tuple)
             bounds = "-INT_MAX, INT_MAX"
             if is_item or kind == CONDITION:
@@ -512,14 +527,33 @@ class Events:
         return rows
 
     def _describe(self) -> list[str]:
-        code, stores = Code(self.leaves), []
+        code, stores, one = Code(self.leaves), [], self.graph.number(1.0)
         for i, relation in enumerate(self.located):
             found, used = self._described(code, relation), self.used[relation.name]
             if used is not None:
                 found = "if", code.of(used), found, "unused"
             stores.append(store(Place("indicator[", i, "]"), found))
+        for i, limit in enumerate(self.limits, len(self.located)):
+            condition, *cases = limit.cases
+            first, second = (self._described(code, Relation(x, True, None, None, one))
+                             for x in cases)  # fmt: skip
+            found = second if condition is None else ("if", code.of(condition), first, second)
+            if limit.used is not None:
+                found = "if", code.of(limit.used), found, "unused"
+            stores.append(store(Place("indicator[", i, "]"), found))
         code.statements += stores
         return code.lines()
+
+    def _are_possible(self) -> list[str]:
+        """Whether there are relations, or contacts that may hold."""
+        active = [contact.active for contact in self.graph.contacts.contacts] if self.limits else []
+        if self.located or not active or None in active:
+            return [f"return {str(bool(self.located or active)).lower()};"]
+        code = Code(self.leaves)
+        holds = code.of(reduce(partial(self.graph.value, "or"), dict.fromkeys(active)))
+        code.statements.append(Statement(("return ", ("!=", holds, 0), ";")))
+        head = "const struct equations_values *values = values_pointer;"
+        return [head, *code.lines()]
 
     def _described(self, code: Code, relation: Relation) -> Operand:
         """How an indicator follows from the states: from one by a factor, if it can be."""

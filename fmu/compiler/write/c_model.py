@@ -217,7 +217,7 @@ def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list
     rates = {state.leaf: state.value for state in file.of("states")}
     if file.hook:
         return rates, [file.variables[name].value for name in file.hook.series]
-    return rates, [events.signed(relation) for relation in events.located]
+    return rates, events.followed
 
 
 def _has_kinks(followed: tuple[dict[Value, Value], list[Value]]) -> bool:
@@ -296,7 +296,7 @@ def _domains(
         solutions=_solutions(series, ".solution"),
         anchors=c_algebraic.anchors(file),
         jacobian_size=jacobian_size,
-        located=len(events.located),
+        located=len(events.located) + len(events.limits),
     )
     declared = [
         "static enum status indicators_in_domain(const void *values, double t, const double x[],",

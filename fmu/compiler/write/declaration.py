@@ -9,7 +9,7 @@ from typing import Any
 from .. import interface
 from ..expressions.expression import in_order
 from ..expressions.kinds import CONDITION, WHOLE
-from ..graph.graph import MOVING, Relation, Value
+from ..graph.graph import MOVING, Value
 from ..interface import Declaration, Display
 from ..names import Field
 from ..read import by_hand
@@ -19,6 +19,7 @@ from ..read.content import (
     CALCULATED,
     COUNTS,
     FOLLOWS,
+    FORCES,
     OPTIONS,
     SWITCHES,
     ModelFile,
@@ -27,7 +28,7 @@ from ..read.content import (
 )
 from ..read.keys import NUMBERS
 from ..units import ANGLE, BASE, STANDARD, Exponents, parsed, shown
-from . import c_events, c_hook, c_model, lock
+from . import c_contacts, c_events, c_hook, c_model, lock
 from .lock import Key
 
 FLAT = {"floor", "ceil", "round", "mod", "sign"}
@@ -43,6 +44,7 @@ CAUSALITIES = {
     "states": "output",
     "discrete": "output",
     ALGEBRAIC: "local",
+    FORCES: "local",
     "where": "local",
     "outputs": "output",
 }
@@ -70,15 +72,16 @@ def _without_derivative(file: ModelFile) -> list[Variable]:
     return [state for state in file.of("states") if state.name not in named]
 
 
-def _indicators(file: ModelFile) -> dict[str, Relation]:
-    """The relations that have an indicator, by its name, which no other variable has."""
+def _indicators(file: ModelFile) -> dict[str, Value]:
+    """The distances that have an indicator, by its name, which no other variable has."""
     taken, found = {*file.variables, *file.modes}, {}
     for relation in file.graph.located:
         name = f"indicator_{relation.name}"
         while name in taken:
             name += "_"
-        found[name] = relation
-    return found
+        found[name] = relation.distance
+    limits = c_contacts.limits(file)
+    return found | {limit.name: c_contacts.distance(file, limit) for limit in limits}
 
 
 def generated(file: ModelFile) -> dict[str, str]:
@@ -155,7 +158,8 @@ def _variables(
     file: ModelFile, references: dict[Key, int], units: dict[str, Exponents]
 ) -> dict[str, interface.Variable]:
     """Return the variables of a file; `units` gets those that it lacks."""
-    tables = {v.name: _entries_of(v, file, units) for v in file.variables.values()}
+    own = [v for v in file.variables.values() if v.section != FORCES]
+    tables = {v.name: _entries_of(v, file, units) for v in own}
     for state in _without_derivative(file):
         rate = state.exponents | {"s": state.exponents.get("s", 0) - file.has_units}
         tables[f"der_{state.name}"] = {
@@ -168,11 +172,11 @@ def _variables(
     for mode in file.modes if c_events.has_events(file) else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(file.fields.count(mode)) | own
-    for i, (name, relation) in enumerate(_indicators(file).items()):
+    for i, (name, distance) in enumerate(_indicators(file).items()):
         tables[name] = {
             **_local(Field("z", i)),
             "unit": "1",
-            **_dependencies(relation.distance, file),
+            **_dependencies(distance, file),
             "description": "Distance from an event; 1 while it plays no role",
         }
     for tick in c_events.ticks(file):
@@ -299,7 +303,7 @@ def _entries_of(
         entries |= {"initial": "exact", "dependencies": (variable.name,)}
         by_events = any(variable.name in change.reinit for change in file.changes)
         in_c = file.hook is not None or bool(file.indicators) or file.time_events
-        entries["reinit"] = by_events or in_c
+        entries["reinit"] = by_events or in_c or variable.leaf in _moved(file)
     if variable.section == "discrete":
         entries |= {"variability": "discrete", "initial": "exact"}
         leaves = _reached({("discrete", variable.name)}, file, ["discrete"])
@@ -399,6 +403,10 @@ def _is_in(file: ModelFile, name: str, *sections: str) -> bool:
 def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) -> set[Leaf]:
     """All leaves that these follow from by relations and, if of a kind in `changed`, by changes."""
     found, todo = set(), list(leaves)
+    of_contacts = {c.variable(key) for c in file.contacts for key in ("mode", "impulse", "loss")}
+    if "state" in changed:
+        of_contacts |= {x.name for x in _moved(file)}
+    deciding = [leaf for value in c_contacts.read(file) for leaf in value.leaves]
     while todo:
         leaf = todo.pop()
         if leaf in found:
@@ -414,6 +422,8 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
             todo += [known for known in _all_known(file) if known[1] in given]
             is_any = "state" in changed and not (op == "state" and given)
             todo += _all_known(file) - found if is_any else ()
+        if name in of_contacts:
+            todo += deciding
         if "state" in changed:
             initial = file.variables[name].initial if name in file.variables else None
             todo += initial.value.leaves if initial is not None else ()
@@ -423,6 +433,15 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
                 own = [*change.conditions, change.given[name]]
                 todo += [leaf for expression in own for leaf in expression.value.leaves]
     return found
+
+
+def _moved(file: ModelFile) -> set[Value]:
+    """States that contacts set."""
+    found = file.graph.contacts
+    if found is None:
+        return set()
+    places = {contact.place[0] for contact in found.contacts if contact.place}
+    return {*found.moved, *(direction.own for direction in found.directions), *places}
 
 
 def _all_known(file: ModelFile) -> set[Leaf]:

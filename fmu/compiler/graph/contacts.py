@@ -1,0 +1,547 @@
+"""Dry friction and stops as values of a graph: forces that hold what is at rest.
+
+Accelerations are affine in the forces of all contacts: a = a0 + B f. A direction is a velocity that
+friction and stops act on; while it is held, the force of its contact makes its acceleration 0.
+src/model/contacts.c decides what is held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial, reduce
+from typing import TYPE_CHECKING
+
+from . import algebraic
+from .algebraic import replaced
+
+if TYPE_CHECKING:
+    from .graph import Graph, Value
+
+BACKWARD, STUCK, FORWARD = 1, 2, 3  # modes of friction
+FREE, LOWER, UPPER = 1, 2, 3  # modes of stops
+MOST_COUPLED = 8  # src/model/contacts.h
+STILL = ("parameter", "integer", "mode", "discrete")  # leaves of factors
+OF_OFFSETS = (*STILL, "time")
+
+
+@dataclass(eq=False)
+class Contact:
+    """Friction or stops; `given` has values of the file by their keys."""
+
+    name: str
+    is_friction: bool
+    force: Value  # leaf
+    mode: Value
+    given: dict[str, Value]
+    active: Value | None = None  # None: always
+    law: Value | None = None  # size of friction that slides
+    ratio: Value | None = None  # of its velocity to that of its direction
+    place: tuple[Value, Value] | None = None  # of stops: state that a limit sets, its factor
+    tolerances: dict[Value, Value] = field(default_factory=dict)  # factors of states in it
+
+
+@dataclass(eq=False)
+class Direction:
+    """A velocity on which friction and stops act."""
+
+    velocity: Value
+    row: dict[Value, Value]  # factors by state
+    contacts: list[Contact]
+    own: Value  # state that follows from the others while it is held
+    rest: Value  # what that is then
+    held: Value
+    hold: Value | None = None  # force, in the direction of the velocity
+
+    @property
+    def friction(self) -> Contact | None:
+        """The friction, which comes first."""
+        return self.contacts[0] if self.contacts[0].is_friction else None
+
+    @property
+    def stops(self) -> list[Contact]:
+        """The stops."""
+        return [contact for contact in self.contacts if not contact.is_friction]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A distance that is above 0 while modes are valid, with another one for some modes."""
+
+    name: str
+    number: int  # of its contact
+    used: Value | None
+    cases: tuple[Value | None, Value, Value]  # condition, distance if it holds, else
+
+
+@dataclass(eq=False)
+class Contacts:
+    """All contacts of a model, and what decides them."""
+
+    contacts: list[Contact]
+    directions: list[Direction]
+    limits: list[Limit]
+    accelerations: list[Value]  # of the directions, without forces
+    response: list[list[Value]]  # of accelerations to the forces, B
+    moved: dict[Value, list[Value]]  # states that impulses move, with the response of their rates
+    blocks: list[list[int]]  # directions that are decided together
+
+
+class ContactError(ValueError):
+    """What is wrong with a contact: its name, the key and the reason."""
+
+    def __init__(self, contact: Contact, key: str, text: str) -> None:
+        super().__init__(text)
+        self.contact, self.key = contact, key
+
+
+class Builder:
+    """Finds directions and forces of contacts. rates: of the states by their leaves."""
+
+    def __init__(self, graph: Graph, contacts: list[Contact], rates: Mapping[Value, Value]) -> None:
+        self.graph, self.contacts, self.rates = graph, contacts, dict(rates)
+        self.zero, self.one = graph.number(0.0), graph.number(1.0)
+        self.forces = {(c.force.op, c.force.name): c for c in contacts}
+        self.directions: list[Direction] = []
+
+    # ---- Directions ------------------------------------------------------------------------------
+
+    def find(self) -> None:
+        """Check the contacts, and find their directions."""
+        for contact in self.contacts:
+            for key in contact.given:
+                self._check_reads(contact, key)
+            contact.active = self._active(contact)
+            contact.law = self._law(contact) if contact.is_friction else None
+        for contact in sorted(self.contacts, key=lambda c: not c.is_friction):
+            self._add(contact, self._row(contact, "velocity", contact.given["velocity"]))
+        for direction in self.directions:
+            direction.held = self._held(direction)
+
+    def _check_reads(self, contact: Contact, key: str) -> None:
+        read = contact.given[key].leaves & self.forces.keys()
+        if read:
+            name = min(name for _, name in read)
+            text = f"reads the unknown force {name}: then no motion, or several, may be possible"
+            raise ContactError(contact, key, text)
+
+    def _active(self, contact: Contact) -> Value | None:
+        """Return when a contact can hold: friction also not where a fixed limit is 0."""
+        found, limit = contact.given.get("while"), self.breakaway(contact)
+        if found is not None and found.moves:
+            raise ContactError(contact, "while", "moves: expected parameters and modes")
+        if limit is None or limit.moves:
+            return found
+        if limit.op == "number" and limit.number > 0:
+            return found
+        exists = self.graph.value(">", limit, self.zero)
+        return exists if found is None else self.graph.value("and", found, exists)
+
+    def breakaway(self, contact: Contact) -> Value | None:
+        """Return the largest friction at rest."""
+        return contact.given.get("breakaway", contact.given.get("coulomb"))
+
+    def _row(self, contact: Contact, key: str, value: Value) -> tuple[dict[Value, Value], Value]:
+        """Return factors of the states in a value, and the rest."""
+        (row,) = self.graph.gradients([value], self.rates)
+        row = {x: factor for x, factor in row.items() if not _is_zero(factor)}
+        if not row:
+            raise ContactError(contact, key, "follows from no state")
+        for x, factor in row.items():
+            if {op for op, _ in factor.leaves} - {*STILL}:
+                text = f"must be linear in the states: the factor of {x.name} is not fixed"
+                raise ContactError(contact, key, text)
+        (rest,) = replaced(self.graph, [value], dict.fromkeys(row, self.zero))
+        wrong = sorted(name for op, name in rest.leaves if op not in OF_OFFSETS)
+        if wrong:
+            text = f"reads {wrong[0]}: expected states, parameters and the time"
+            raise ContactError(contact, key, text)
+        return row, rest
+
+    def _add(self, contact: Contact, found: tuple[dict[Value, Value], Value]) -> None:
+        """Add a contact to the direction of its velocity."""
+        row, rest = found
+        for direction in self.directions:
+            ratio = self._ratio(contact.given["velocity"], row, direction)
+            if ratio is not None:
+                if contact.is_friction:
+                    text = f"is that of {direction.contacts[0].name}: add the two limits in one"
+                    raise ContactError(contact, "velocity", text)
+                contact.ratio = ratio
+                direction.contacts.append(contact)
+                break
+        else:
+            taken = {direction.own for direction in self.directions}
+            free = [x for x in row if x not in taken]
+            if not free:
+                others = ", ".join(d.contacts[0].name for d in self.directions)
+                raise ContactError(contact, "velocity", f"follows from those of {others}")
+            own = min(free, key=lambda x: row[x].op not in ("number", "negative"))
+            contact.ratio = self.one
+            at_rest = self._solved_for(own, row, rest)
+            new = Direction(contact.given["velocity"], row, [contact], own, at_rest, self.one)
+            self.directions.append(new)
+        if not contact.is_friction:
+            self._find_place(contact, row, rest)
+
+    def _ratio(self, velocity: Value, row: dict[Value, Value], other: Direction) -> Value | None:
+        """Return a velocity over that of a direction, if that is fixed."""
+        if velocity is other.velocity or row == other.row:
+            return self.one
+        if row.keys() != other.row.keys():
+            return None
+        if all(self._opposite(row[x], other.row[x]) for x in row):
+            return self.graph.number(-1.0)
+        if len(row) == 1:
+            ((x, factor),) = row.items()
+            return self.graph.simple("/", factor, other.row[x])
+        return None
+
+    def _opposite(self, a: Value, b: Value) -> bool:
+        if a.op == b.op == "number":
+            return a.number == -b.number
+        return self.graph.negative(a) is b or self.graph.negative(b) is a
+
+    def _solved_for(self, own: Value, row: Mapping[Value, Value], rest: Value) -> Value:
+        """Return the value of a state at which a linear value is 0."""
+        total = rest
+        for x, factor in row.items():
+            if x is not own:
+                total = self._plus(total, self._times(factor, x))
+        return self._over(self.graph.negative(total), row[own])
+
+    def _find_place(self, contact: Contact, row: dict[Value, Value], rest: Value) -> None:
+        """Find the state that is set where a stop is reached."""
+        graph, position = self.graph, contact.given["position"]
+        places, offset = self._row(contact, "position", position)
+        rate, = graph.derivatives([position], self.rates | {graph.value("time"): self.one})
+        if rate.leaves & self.forces.keys():
+            raise ContactError(contact, "position", "has no velocity: a force acts on its rate")
+        of_rate = self._row(contact, "position", rate)
+        if of_rate != (row, rest):
+            text = "must be the rate of position, written in the same way"
+            raise ContactError(contact, "velocity", text)
+        own = min(places, key=lambda x: places[x].op not in ("number", "negative"))
+        contact.place = own, self._solved_for(own, places, offset)
+        contact.tolerances = places
+
+    # ---- Forces ----------------------------------------------------------------------------------
+
+    def _is(self, contact: Contact, mode: int) -> Value:
+        return self.graph.value("==", contact.mode, self.graph.number(float(mode)))
+
+    def stuck(self, direction: Direction) -> Value | None:
+        """Return whether friction holds a direction; None: it has none."""
+        return self._is(direction.friction, STUCK) if direction.friction else None
+
+    def closed(self, contact: Contact) -> Value:
+        """Return whether stops are closed."""
+        return self.graph.value("not", self._is(contact, FREE))
+
+    def _held(self, direction: Direction) -> Value:
+        stuck = self.stuck(direction)
+        found = [] if stuck is None else [stuck]
+        found += [self.closed(contact) for contact in direction.stops]
+        return reduce(partial(self.graph.value, "or"), found)
+
+    def sliding(self, contact: Contact) -> Value:
+        """Return friction of what slides, against its velocity: with its sign."""
+        return self._if(self._is(contact, BACKWARD), self.graph.negative(contact.law), contact.law)
+
+    def _law(self, contact: Contact) -> Value:
+        """Return the size of sliding friction: c + (b - c) exp(-(v / v_s)^2)."""
+        graph, given = self.graph, contact.given
+        if "breakaway" not in given:
+            size = given["coulomb"]
+        else:
+            w = graph.value("/", given["velocity"], given["stribeck"])
+            e = graph.value("exp", graph.value("negative", graph.value("*", w, w)))
+            at_rest = graph.value("*", given["breakaway"], e)
+            slides = graph.value("*", given["coulomb"], graph.value("-", self.one, e))
+            size = self._if(
+                graph.value(">", given["stribeck"], self.zero),
+                graph.value("+", at_rest, slides),
+                given["coulomb"],
+            )
+        return size if contact.active is None else self._if(contact.active, size, self.zero)
+
+    def build(self) -> tuple[Contacts, dict[Value, Value], dict[Value, Value], dict[Value, Value]]:
+        """Return the contacts, forces in rates, forces that are shown, and rates of the states.
+
+        Who carries a closed stop's direction where friction holds it, too, is shown only: friction
+        does as far as it can. In rates it does so alone.
+        """
+        self.find()
+        graph, forces = self.graph, [c.force for c in self.contacts]
+        rates = [*self.rates.values()]
+        slopes = graph.gradients(rates, forces)
+        moved = {
+            x: [row.get(f, self.zero) for f in forces]
+            for x, row in zip(self.rates, slopes, strict=True)
+            if any(not _is_zero(s) for s in row.values())
+        }
+        for x, row in moved.items():
+            for contact, slope in zip(self.contacts, row, strict=True):
+                if slope.leaves & self.forces.keys():
+                    text = f"the derivative of {x.name} is not linear in {contact.force.name}"
+                    raise ContactError(contact, "force", text)
+        free = dict(zip(rates, replaced(graph, rates, dict.fromkeys(forces, self.zero)), strict=True))
+        response, accelerations, plain = [], [], []
+        for direction in self.directions:
+            own = direction.contacts[0]
+            _, offset = self._row(own, "velocity", direction.velocity)
+            (jerk,) = graph.derivatives([offset], {graph.value("time"): self.one})
+            total, whole = jerk, jerk
+            for x, factor in direction.row.items():
+                whole = self._plus(whole, self._times(factor, self.rates[x]))
+                total = self._plus(total, self._times(factor, free[self.rates[x]]))
+            accelerations.append(total)
+            plain.append(whole)
+            response.append([
+                self._sum(self._times(factor, moved[x][e]) for x, factor in direction.row.items()
+                          if x in moved)
+                for e in range(len(forces))
+            ])  # fmt: skip
+            for contact in direction.contacts:
+                if _is_zero(response[-1][self.contacts.index(contact)]):
+                    text = f"{contact.force.name} does not act on the velocity"
+                    raise ContactError(contact, "force", text)
+        blocks = self._blocks(response)
+        found = Contacts(self.contacts, self.directions, [], accelerations, response, moved, blocks)
+        self._solve(found, plain)
+        in_rates, shown = self._forces(found)
+        found.limits += sorted(self._limits(in_rates), key=lambda limit: limit.number)
+        return found, in_rates, shown, self._rates(in_rates)
+
+    def _blocks(self, response: list[list[Value]]) -> list[list[int]]:
+        """Return groups of directions whose forces act on each other."""
+        count, of = len(self.directions), {}
+        for k, direction in enumerate(self.directions):
+            of |= {self.contacts.index(contact): k for contact in direction.contacts}
+        group = [*range(count)]
+        for k in range(count):
+            for e, slope in enumerate(response[k]):
+                a, b = group[k], group[of[e]]
+                if not _is_zero(slope) and a != b:
+                    group = [a if g == b else g for g in group]
+        blocks = [[k for k in range(count) if group[k] == g] for g in dict.fromkeys(group)]
+        for block in blocks:
+            if len(block) > MOST_COUPLED:
+                names = ", ".join(self.directions[k].contacts[0].name for k in block)
+                text = f"more than {MOST_COUPLED} velocities are held together: {names}"
+                raise ContactError(self.directions[block[0]].contacts[0], "force", text)
+        return blocks
+
+    def _column(self, direction: Direction, row: list[Value]) -> Value:
+        """Return the response of an acceleration to the force that holds a direction."""
+        value = self.zero
+        for contact in direction.contacts[::-1]:
+            own = row[self.contacts.index(contact)]
+            if contact.is_friction:
+                own = self.graph.negative(own)
+                own = own if not direction.stops else self._if(self.stuck(direction), own, value)
+            else:
+                own = self._over(own, contact.ratio)
+                is_last = contact is direction.contacts[-1]
+                own = own if is_last else self._if(self.closed(contact), own, value)
+            value = own
+        return value
+
+    def _solve(self, found: Contacts, accelerations: list[Value]) -> None:
+        """Find the forces that hold directions, by which their accelerations are 0."""
+        graph = self.graph
+        sliding = {}
+        for contact in self.contacts:
+            own = self.zero
+            if contact.is_friction:
+                slides = self.sliding(contact)
+                own = self._if(self._is(contact, STUCK), self.zero, slides)
+            sliding[contact.force] = own
+        pushed = replaced(graph, accelerations, sliding)
+        for block in found.blocks:
+            right = [
+                self._if(self.directions[k].held, graph.negative(pushed[k]), self.zero)
+                for k in block
+            ]
+            if len(block) == 1:
+                (k,) = block
+                column = self._column(self.directions[k], found.response[k])
+                hold = self._over(graph.negative(pushed[k]), column)
+                self.directions[k].hold = self._if(self.directions[k].held, hold, self.zero)
+                continue
+            elements = {}
+            for i, k in enumerate(block):
+                for j, l in enumerate(block):
+                    column = self._column(self.directions[l], found.response[k])
+                    if i == j or not _is_zero(column):
+                        diagonal = self.one if i == j else self.zero
+                        elements[i, j] = self._if(self.directions[k].held, column, diagonal)
+            vector = graph.value("linear", algebraic.matrix(graph, elements), *right)
+            names = [c.force.name for k in block for c in self.directions[k].contacts]
+            texts = [f"0 = der({self.directions[k].contacts[0].name}.velocity)" for k in block]
+            graph.linear.append(algebraic.Linear(names, texts, vector))
+            for i, k in enumerate(block):
+                self.directions[k].hold = algebraic.component(graph, vector, i)
+
+    def _forces(self, found: Contacts) -> tuple[dict[Value, Value], dict[Value, Value]]:
+        """Return the force of each contact, in rates and as it is shown."""
+        graph, in_rates, shown = self.graph, {}, {}
+        for direction in found.directions:
+            friction, stuck, hold = direction.friction, self.stuck(direction), direction.hold
+            if friction is not None:
+                slides = self.sliding(friction)
+                in_rates[friction.force] = self._if(stuck, graph.negative(hold), slides)
+                shown[friction.force] = in_rates[friction.force]
+            for contact in direction.stops:
+                force = self._over(hold, contact.ratio)
+                alone = self.closed(contact)
+                if stuck is not None:
+                    alone = graph.value("and", alone, graph.value("not", stuck))
+                in_rates[contact.force] = self._if(alone, force, self.zero)
+                shown[contact.force] = in_rates[contact.force]
+                if friction is None:
+                    continue
+                excess = self._excess(friction, contact, hold)
+                both = graph.value("and", stuck, self.closed(contact))
+                shown[contact.force] = self._if(
+                    both, self._over(excess, contact.ratio), in_rates[contact.force]
+                )
+                rest = graph.value("-", excess, hold)
+                shown[friction.force] = self._if(both, rest, shown[friction.force])
+        return in_rates, shown
+
+    def is_positive(self, contact: Contact) -> Value:
+        """Return whether closed stops push in the direction's sense."""
+        lower = self._is(contact, LOWER)
+        positive = self.graph.value(">", contact.ratio, self.zero)
+        if contact.ratio.op == "number":
+            return lower if contact.ratio.number > 0 else self.graph.value("not", lower)
+        return self._if_condition(positive, lower, self.graph.value("not", lower))
+
+    def _if_condition(self, condition: Value, first: Value, second: Value) -> Value:
+        graph = self.graph
+        otherwise = graph.value("and", graph.value("not", condition), second)
+        return graph.value("or", graph.value("and", condition, first), otherwise)
+
+    def _excess(self, friction: Contact, contact: Contact, hold: Value) -> Value:
+        """Return what a stop carries of the force that holds its direction."""
+        graph, limit = self.graph, self.breakaway(friction)
+        lower = graph.value("negative", limit)
+        above = graph.value("if", graph.value(">", hold, limit), graph.value("-", hold, limit), self.zero)
+        below = graph.value("if", graph.value("<", hold, lower), graph.value("-", hold, lower), self.zero)
+        return self._if(self.is_positive(contact), above, below)
+
+    def _rates(self, forces: Mapping[Value, Value]) -> dict[Value, Value]:
+        """Return the rates of the states: of what is held, one follows from the others."""
+        rates = [*self.rates.values()]
+        found = dict(zip(self.rates, replaced(self.graph, rates, forces), strict=True))
+        done: set[Value] = set()
+        owners = {direction.own: direction for direction in self.directions}
+
+        def finish(x: Value, above: tuple[Value, ...]) -> Value | None:
+            """Return the rate of a state; None in a circle."""
+            if x in above:
+                return None
+            if x not in owners or x in done:
+                return found[x]
+            direction, total = owners[x], self.zero
+            _, offset = self._row(direction.contacts[0], "velocity", direction.velocity)
+            (total,) = self.graph.derivatives([offset], {self.graph.value("time"): self.one})
+            for other, factor in direction.row.items():
+                if other is not x:
+                    rate = finish(other, (*above, x))
+                    if rate is None:
+                        return None
+                    total = self._plus(total, self._times(factor, rate))
+            at_rest = self._over(self.graph.negative(total), direction.row[x])
+            found[x] = self._if(direction.held, at_rest, found[x])
+            done.add(x)
+            return found[x]
+
+        for x in owners:
+            finish(x, ())
+        return found
+
+    # ---- Limits ----------------------------------------------------------------------------------
+
+    def _limits(self, forces: Mapping[Value, Value]) -> list[Limit]:
+        """Return two limits of each contact: forward and backward, or lower and upper."""
+        graph, found = self.graph, []
+        for direction in self.directions:
+            stuck = self.stuck(direction)
+            for contact in direction.contacts:
+                number = self.contacts.index(contact)
+                if contact.is_friction:
+                    found += self._limits_of_friction(direction, contact, number)
+                    continue
+                for key, mode, sign in (("lower", LOWER, 1), ("upper", UPPER, -1)):
+                    force, distance = forces[contact.force], self.one
+                    is_closed, used = self._is(contact, mode), self._is(contact, FREE)
+                    if key in contact.given:
+                        ends = contact.given["position"], contact.given[key]
+                        distance = graph.value("-", *ends[::sign])
+                        used = graph.value("or", used, is_closed)
+                    else:
+                        used = is_closed
+                    if stuck is not None:
+                        used = graph.value("and", graph.value("not", stuck), used)
+                    if contact.active is not None:
+                        used = graph.value("and", contact.active, used)
+                    pushes = force if sign > 0 else graph.negative(force)
+                    cases = (is_closed, pushes, distance)
+                    found.append(Limit(f"{contact.name}.{key}", number, used, cases))
+        return found
+
+    def _limits_of_friction(
+        self, direction: Direction, contact: Contact, number: int
+    ) -> list[Limit]:
+        graph, limit, stuck = self.graph, self.breakaway(contact), self._is(contact, STUCK)
+        velocity = contact.given["velocity"]
+        moves = self._if(self._is(contact, BACKWARD), graph.negative(velocity), velocity)
+        used, opens = [contact.active, stuck], []
+        for stop in direction.stops:
+            positive, is_open = self.is_positive(stop), self._is(stop, FREE)
+            opens.append(
+                [graph.value("or", is_open, side) for side in (positive, graph.value("not", positive))]
+            )
+        sides = []
+        for i in range(2):
+            conditions = [sides_of[i] for sides_of in opens]
+            sides.append(reduce(partial(graph.value, "and"), conditions) if conditions else None)
+        forward, backward = sides
+        first = used[0]
+        if forward is not None:
+            own = graph.value("or", graph.value("not", stuck), forward)
+            first = own if first is None else graph.value("and", first, own)
+        second = stuck if backward is None else graph.value("and", stuck, backward)
+        left = graph.value("+", limit, direction.hold)
+        right = graph.value("-", limit, direction.hold)
+        return [
+            Limit(f"{contact.name}.forward", number, first, (stuck, left, moves)),
+            Limit(f"{contact.name}.backward", number, second, (None, right, right)),
+        ]
+
+    # ---- Operations ------------------------------------------------------------------------------
+
+    def _if(self, condition: Value, first: Value, second: Value) -> Value:
+        return first if first is second else self.graph.value("if", condition, first, second)
+
+    def _plus(self, a: Value, b: Value) -> Value:
+        return self.graph.simple("+", a, b)
+
+    def _sum(self, values) -> Value:
+        return reduce(self._plus, values, self.zero)
+
+    def _times(self, a: Value, b: Value) -> Value:
+        if a.op == "number" and a.number == -1.0:
+            return self.graph.negative(b)
+        return self.graph.simple("*", a, b)
+
+    def _over(self, a: Value, b: Value) -> Value:
+        if b.op == "number" and b.number == -1.0:
+            return self.graph.negative(a)
+        return self.graph.simple("/", a, b)
+
+
+def _is_zero(value: Value) -> bool:
+    return value.op == "number" and value.number == 0.0

@@ -1,0 +1,184 @@
+"""Dry friction and stops in C (src/model/contacts.h): their tables, limits and what decides them."""
+
+from collections.abc import Sequence
+
+from ..graph.contacts import Contact, Direction, Limit
+from ..graph.graph import Value
+from ..read.content import ModelFile
+from .c_code import Code, Leaves
+from .c_text import filled, text
+from .errors import Errors
+from .statements import Operand, Place, Statement, store
+
+
+def limits(file: ModelFile) -> list[Limit]:
+    """Return the limits of all contacts, two of each."""
+    return file.graph.contacts.limits if file.graph.contacts else []
+
+
+def distance(file: ModelFile, limit: Limit) -> Value:
+    """Return the distance of a limit in the modes that are."""
+    graph = file.graph
+    condition, first, second = limit.cases
+    return second if condition is None else graph.value("if", condition, first, second)
+
+
+def indicator(file: ModelFile, limit: Limit) -> Value:
+    """Return the distance of a limit, or 1."""
+    found = distance(file, limit)
+    return found if limit.used is None else file.graph.value(
+        "if", limit.used, found, file.graph.number(1.0)
+    )  # fmt: skip
+
+
+def read(file: ModelFile) -> list[Value]:
+    """Return all that decides contacts."""
+    found = file.graph.contacts
+    if found is None:
+        return []
+    values = [*found.accelerations, *(v for row in found.response for v in row)]
+    values += [v for row in found.moved.values() for v in row]
+    values += [v for contact in found.contacts for v in contact.given.values()]
+    for limit in found.limits:
+        values += [distance(file, limit), *([] if limit.used is None else [limit.used])]
+    return values
+
+
+def compare(file: ModelFile, code: Code, errors: Errors, slopes: Sequence[Value]) -> list[Statement]:
+    """Return statements that compare the limits; slopes: their derivatives by the time."""
+    stores, first = [], len(file.graph.relations)
+    for i, (limit, slope) in enumerate(zip(limits(file), slopes, strict=True)):
+        found = distance(file, limit)
+        entries = {
+            "distance": code.of(found),
+            "slope": code.of(slope),
+            "noise": errors.of(found),
+            "used": "1" if limit.used is None else code.of(limit.used),
+        }
+        for key, of in entries.items():
+            stores.append(store(Place("compared[", first + i, f"].{key}"), of))
+    return stores
+
+
+def parts(file: ModelFile, leaves: Leaves) -> dict[str, object]:
+    """Return what events.c.in has of contacts."""
+    found = file.graph.contacts
+    if found is None:
+        return {"contacts": [], "of_contacts": [], "limits": 0, "room_of_contacts": ", {0}"}
+    counts = [len(found.directions), len(found.contacts), len(found.moved)]
+    states = {x.leaf: i for i, x in enumerate(file.of("states"))}
+    text_of = filled(
+        "contacts.c.in",
+        contact=[_contact_row(file, contact, states) for contact in found.contacts],
+        direction=[_direction_row(file, direction, states) for direction in found.directions],
+        moved=", ".join(str(states[x]) for x in found.moved) or "0",
+        measure=_measure(file, leaves),
+        contacts=counts[1],
+        directions=counts[0],
+        blocks=len(found.blocks),
+        moved_count=counts[2],
+        indicator=len(file.graph.located),
+    )
+    room = f"CONTACTS_ROOM({', '.join(map(str, counts))})"
+    return {
+        "contacts": text_of.splitlines(),
+        "of_contacts": [".contacts = &contacts,"],
+        "limits": len(found.limits),
+        "room_of_contacts": f", {room}",
+    }
+
+
+def _contact_row(file: ModelFile, contact: Contact, states: dict[Value, int]) -> str:
+    from .c_events import counted  # it needs this module
+
+    direction = next(i for i, d in enumerate(file.graph.contacts.directions) if contact in d.contacts)
+    numbers = {name: i for i, name in enumerate(counted(file))}
+    own = [
+        text(contact.name),
+        str(contact.is_friction).lower(),
+        *(str(key in contact.given).lower() for key in ("lower", "upper")),
+        str(direction),
+        str(numbers[f"{contact.name}.mode"]),
+    ]
+    if contact.is_friction:
+        return f"{{{', '.join([*own, '0', '0', '0'])}}},"
+    own.append(str(states[contact.place[0]]))
+    for key in ("impulse", "loss"):
+        field = file.fields.value(f"{contact.name}.{key}")
+        own.append(f"offsetof(struct equations_values, {field})")
+    return f"{{{', '.join(own)}}},"
+
+
+def _direction_row(file: ModelFile, direction: Direction, states: dict[Value, int]) -> str:
+    blocks, number = file.graph.contacts.blocks, file.graph.contacts.directions.index(direction)
+    block = next(i for i, block in enumerate(blocks) if number in block)
+    is_plain = len(direction.row) == 1 and not direction.rest.leaves
+    return f"{{{states[direction.own]}, {str(is_plain).lower()}, {block}}},"
+
+
+def _measure(file: ModelFile, leaves: Leaves) -> list[str]:
+    found, graph, code = file.graph.contacts, file.graph, Code(leaves)
+    states = {x.leaf: i for i, x in enumerate(file.of("states"))}
+    count, zero = len(found.contacts), graph.number(0.0)
+    values: dict[Place, Value | Operand] = {}
+    sums: list[Statement] = []
+    for k, direction in enumerate(found.directions):
+        of = {
+            "velocity": direction.velocity,
+            "rest": direction.rest,
+            "factor": direction.row[direction.own],
+            "acceleration": found.accelerations[k],
+        }
+        values |= {Place(f"to->{key}[", k, "]"): value for key, value in of.items()}
+        values |= {
+            Place("to->response[", k * count + e, "]"): slope
+            for e, slope in enumerate(found.response[k])
+        }
+    for m, row in enumerate(found.moved.values()):
+        values |= {Place("to->jump[", m * count + e, "]"): slope for e, slope in enumerate(row)}
+    for e, contact in enumerate(found.contacts):
+        values |= {
+            Place(f"to->{key}[", e, "]"): value for key, value in _of_contact(file, contact).items()
+        }
+    code.assign(values)
+    for k, direction in enumerate(found.directions):
+        terms = [("fabs", ("*", code.of(f), code.of(x))) for x, f in direction.row.items()]
+        sums.append(store(Place("to->size[", k, "]"), _sum(terms)))
+    for e, contact in enumerate(found.contacts):
+        terms = [
+            ("*", ("fabs", code.of(factor)), Place("tolerance[", states[x], "]"))
+            for x, factor in contact.tolerances.items()
+        ]
+        if terms:
+            sums.append(store(Place("to->tolerance[", e, "]"), _sum(terms)))
+        active = contact.active if contact.active is not None else None
+        is_active = "1.0" if active is None else ("if", code.of(active), 1.0, 0.0)
+        sums.append(store(Place("to->active[", e, "]"), is_active))
+    code.statements += sums
+    return code.lines()
+
+
+def _of_contact(file: ModelFile, contact: Contact) -> dict[str, Value]:
+    """Return what is measured of a contact."""
+    given, graph = contact.given, file.graph
+    if contact.is_friction:
+        own = {key: given[key] for key in ("coulomb", "stribeck") if key in given}
+        own["breakaway"] = given.get("breakaway", given["coulomb"])
+        return own | {"ratio": contact.ratio, "law": contact.law}
+    own = {key: given[key] for key in ("position", "lower", "upper") if key in given}
+    own |= {"ratio": contact.ratio, "restitution": given["restitution"]}
+    state, rest = contact.place
+    factor = contact.tolerances[state]
+    for key in ("lower", "upper"):
+        if key in given:
+            is_plain = factor.op == "number" and factor.number == 1.0
+            limit = given[key] if is_plain else graph.value("/", given[key], factor)
+            own[f"at_{key}"] = graph.simple("+", limit, rest)
+    return own
+
+
+def _sum(terms: Sequence[Operand]) -> Operand:
+    total = terms[0]
+    for term in terms[1:]:
+        total = "+", total, term
+    return total
