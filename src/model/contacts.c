@@ -33,8 +33,8 @@ static struct contacts_measured measured_in(const struct contacts *model, double
     double **const of_directions[] = {&to.velocity, &to.size, &to.rest, &to.factor,
                                       &to.acceleration};
     double **const of_contacts[] = {
-        &to.active,   &to.ratio,     &to.law,        &to.coulomb,   &to.breakaway,
-        &to.stribeck, &to.position,  &to.lower,      &to.upper,     &to.at_lower,
+        &to.active,   &to.ratio,       &to.law,       &to.coulomb, &to.breakaway,
+        &to.stribeck, &to.position,    &to.lower,     &to.upper,   &to.at_lower,
         &to.at_upper, &to.restitution, &to.tolerance,
     };
     for (size_t i = 0; i < sizeof of_directions / sizeof *of_directions; i++) {
@@ -102,8 +102,8 @@ static double response(const struct work *work, int to, int of) {
 static enum status refuse(const struct work *work, const char *name, const char *what, double value,
                           const char *wanted) {
     if (work->event != NULL && work->event->reason != NULL) {
-        (void)snprintf(work->event->reason, work->event->reason_size, "%s: %s = %.9g is refused: %s",
-                       name, what, value, wanted);
+        (void)snprintf(work->event->reason, work->event->reason_size,
+                       "%s: %s = %.9g is refused: %s", name, what, value, wanted);
     }
     return STATUS_INVALID_PARAMETERS;
 }
@@ -217,8 +217,8 @@ static bool is_held(const struct work *work, int direction) {
     for (int e = 0; e < work->model->contact_count; e++) {
         const struct contact *contact = &work->model->contact[e];
         const int free = contact->is_friction ? FRICTION_STUCK : STOPS_FREE;
-        found |= contact->direction == direction &&
-                 (*mode_of(work, e) == free) == contact->is_friction;
+        found |=
+            contact->direction == direction && (*mode_of(work, e) == free) == contact->is_friction;
     }
     return found;
 }
@@ -301,7 +301,8 @@ static void accelerate(const struct work *work, double acceleration[]) {
         const struct contact *contact = &work->model->contact[e];
         const int of = contact->direction;
         if (contact->is_friction && work->now.active[e] != 0.0 && !work->rests[of]) {
-            const double force = work->now.velocity[of] < 0.0 ? -work->now.law[e] : work->now.law[e];
+            const double force =
+                work->now.velocity[of] < 0.0 ? -work->now.law[e] : work->now.law[e];
             for (int k = 0; k < work->model->direction_count; k++) {
                 acceleration[k] += work->now.response[k * contacts + e] * force;
             }
@@ -396,7 +397,8 @@ static void apply_impulses(struct work *work, const double P[], const int is_str
         for (int k = 0; k < count; k++) {
             if (is_struck[k]) {
                 const double velocity = 0.0 - restitution[k] * work->before[k];
-                x[work->model->direction[k].own] = work->now.rest[k] + velocity / work->now.factor[k];
+                x[work->model->direction[k].own] =
+                    work->now.rest[k] + velocity / work->now.factor[k];
                 measure(work);
             }
         }

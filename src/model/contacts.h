@@ -75,18 +75,18 @@ struct contacts_room {
 
 #define CONTACTS_ROOM(directions, contacts, moved)                                                 \
     (struct contacts_room) {                                                                       \
-        (double[CONTACTS_MEASURED(directions, contacts, moved)]){0}, (double[3 * (directions)]){0}, \
-            (int[6 * (directions) + 3 * (contacts)]) {                                             \
+        (double[CONTACTS_MEASURED(directions, contacts, moved)]){0},                               \
+            (double[3 * (directions)]){0}, (int[6 * (directions) + 3 * (contacts)]) {              \
             0                                                                                      \
         }                                                                                          \
     }
 
 struct call;
 
-/* Decides all contacts: places what has reached a stop there, applies impacts, and writes states and
- * modes. is_first: of this event, so that what has triggered counts; is_start: a position outside
- * its stops is refused. event is NULL before the initialization ends. *changes: set if states or
- * modes have changed. */
+/* Decides all contacts: places what has reached a stop there, applies impacts, and writes states
+ * and modes. is_first: of this event, so that what has triggered counts; is_start: a position
+ * outside its stops is refused. event is NULL before the initialization ends. *changes: set if
+ * states or modes have changed. */
 enum status contacts_update(const struct call *call, const struct event *event, bool is_first,
                             bool is_start, bool *changes);
 
@@ -96,7 +96,8 @@ struct box {
     int count;
     double W[CONTACTS_MOST_COUPLED][CONTACTS_MOST_COUPLED];
     double a0[CONTACTS_MOST_COUPLED];
-    double low[CONTACTS_MOST_COUPLED], high[CONTACTS_MOST_COUPLED]; /* low <= 0 <= high, or infinite */
+    double low[CONTACTS_MOST_COUPLED],
+        high[CONTACTS_MOST_COUPLED]; /* low <= 0 <= high, or infinite */
 };
 
 struct box_solution {

@@ -78,6 +78,8 @@ class Model:
                 "relations.c",
                 "relations_asked.c",
                 "relations_modes.c",
+                "contacts.c",
+                "contacts_box.c",
                 "domains.c",
                 "random.c",
             )

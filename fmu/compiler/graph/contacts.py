@@ -214,7 +214,7 @@ class Builder:
         """Find the state that is set where a stop is reached."""
         graph, position = self.graph, contact.given["position"]
         places, offset = self._row(contact, "position", position)
-        rate, = graph.derivatives([position], self.rates | {graph.value("time"): self.one})
+        (rate,) = graph.derivatives([position], self.rates | {graph.value("time"): self.one})
         if rate.leaves & self.forces.keys():
             raise ContactError(contact, "position", "has no velocity: a force acts on its rate")
         of_rate = self._row(contact, "position", rate)
@@ -285,7 +285,9 @@ class Builder:
                 if slope.leaves & self.forces.keys():
                     text = f"the derivative of {x.name} is not linear in {contact.force.name}"
                     raise ContactError(contact, "force", text)
-        free = dict(zip(rates, replaced(graph, rates, dict.fromkeys(forces, self.zero)), strict=True))
+        free = dict(
+            zip(rates, replaced(graph, rates, dict.fromkeys(forces, self.zero)), strict=True)
+        )
         response, accelerations, plain = [], [], []
         for direction in self.directions:
             own = direction.contacts[0]
@@ -427,8 +429,12 @@ class Builder:
         """Return what a stop carries of the force that holds its direction."""
         graph, limit = self.graph, self.breakaway(friction)
         lower = graph.value("negative", limit)
-        above = graph.value("if", graph.value(">", hold, limit), graph.value("-", hold, limit), self.zero)
-        below = graph.value("if", graph.value("<", hold, lower), graph.value("-", hold, lower), self.zero)
+        above = graph.value(
+            "if", graph.value(">", hold, limit), graph.value("-", hold, limit), self.zero
+        )
+        below = graph.value(
+            "if", graph.value("<", hold, lower), graph.value("-", hold, lower), self.zero
+        )
         return self._if(self.is_positive(contact), above, below)
 
     def _rates(self, forces: Mapping[Value, Value]) -> dict[Value, Value]:
@@ -502,7 +508,10 @@ class Builder:
         for stop in direction.stops:
             positive, is_open = self.is_positive(stop), self._is(stop, FREE)
             opens.append(
-                [graph.value("or", is_open, side) for side in (positive, graph.value("not", positive))]
+                [
+                    graph.value("or", is_open, side)
+                    for side in (positive, graph.value("not", positive))
+                ]
             )
         sides = []
         for i in range(2):

@@ -44,7 +44,9 @@ def read(file: ModelFile) -> list[Value]:
     return values
 
 
-def compare(file: ModelFile, code: Code, errors: Errors, slopes: Sequence[Value]) -> list[Statement]:
+def compare(
+    file: ModelFile, code: Code, errors: Errors, slopes: Sequence[Value]
+) -> list[Statement]:
     """Return statements that compare the limits; slopes: their derivatives by the time."""
     stores, first = [], len(file.graph.relations)
     for i, (limit, slope) in enumerate(zip(limits(file), slopes, strict=True)):
@@ -91,7 +93,9 @@ def parts(file: ModelFile, leaves: Leaves) -> dict[str, object]:
 def _contact_row(file: ModelFile, contact: Contact, states: dict[Value, int]) -> str:
     from .c_events import counted  # it needs this module
 
-    direction = next(i for i, d in enumerate(file.graph.contacts.directions) if contact in d.contacts)
+    direction = next(
+        i for i, d in enumerate(file.graph.contacts.directions) if contact in d.contacts
+    )
     numbers = {name: i for i, name in enumerate(counted(file))}
     own = [
         text(contact.name),
