@@ -7,8 +7,10 @@ src/model/contacts.c decides what is held.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import partial, reduce
 from typing import TYPE_CHECKING
 
@@ -47,10 +49,11 @@ class Direction:
 
     velocity: Value
     row: dict[Value, Value]  # factors by state
+    offset: Value  # what is added to its terms
     contacts: list[Contact]
-    own: Value  # state that follows from the others while it is held
-    rest: Value  # what that is then
-    held: Value
+    own: Value | None = None  # state that follows from the others while it is held
+    rest: Value | None = None  # what that is then
+    held: Value | None = None
     hold: Value | None = None  # force, in the direction of the velocity
 
     @property
@@ -115,7 +118,10 @@ class Builder:
             contact.law = self._law(contact) if contact.is_friction else None
         for contact in sorted(self.contacts, key=lambda c: not c.is_friction):
             self._add(contact, self._row(contact, "velocity", contact.given["velocity"]))
-        for direction in self.directions:
+        self._check_independence()
+        for direction, own in self._owners().items():
+            direction.own = own
+            direction.rest = self._solved_for(own, direction.row, direction.offset)
             direction.held = self._held(direction)
 
     def _check_reads(self, contact: Contact, key: str) -> None:
@@ -171,18 +177,48 @@ class Builder:
                 direction.contacts.append(contact)
                 break
         else:
-            taken = {direction.own for direction in self.directions}
-            free = [x for x in row if x not in taken]
-            if not free:
-                others = ", ".join(d.contacts[0].name for d in self.directions)
-                raise ContactError(contact, "velocity", f"follows from those of {others}")
-            own = min(free, key=lambda x: row[x].op not in ("number", "negative"))
             contact.ratio = self.one
-            at_rest = self._solved_for(own, row, rest)
-            new = Direction(contact.given["velocity"], row, [contact], own, at_rest, self.one)
-            self.directions.append(new)
+            self.directions.append(Direction(contact.given["velocity"], row, rest, [contact]))
         if not contact.is_friction:
             self._find_place(contact, row, rest)
+
+    def _check_independence(self) -> None:
+        """Check that no velocity follows from others, by elimination with any parameters."""
+        done: list[tuple[Value, dict[Value, Fraction], set[int]]] = []  # with pivot and members
+        for k, direction in enumerate(self.directions):
+            row, of = {x: _number(factor) for x, factor in direction.row.items()}, {k}
+            for pivot, other, members in done:
+                if factor := row.get(pivot):
+                    scale = factor / other[pivot]
+                    for x, value in other.items():
+                        row[x] = row.get(x, Fraction(0)) - scale * value
+                    of |= members
+            row = {x: value for x, value in row.items() if value}
+            if not row:
+                names = [self.directions[i].contacts[0].name for i in sorted(of - {k})]
+                text = f"follows from those of {' and '.join(names)}: forces would not be unique"
+                raise ContactError(direction.contacts[0], "velocity", text)
+            done.append((next(iter(row)), row, of))
+
+    def _owners(self) -> dict[Direction, Value]:
+        """Match each direction to a state of its velocity, those with few states first."""
+        by_state: dict[Value, Direction] = {}
+
+        def match(direction: Direction, tried: set[Value]) -> bool:
+            simple = [*direction.row]
+            simple.sort(key=lambda x: direction.row[x].op not in ("number", "negative"))
+            for x in simple:
+                if x not in tried:
+                    tried.add(x)
+                    if x not in by_state or match(by_state[x], tried):
+                        by_state[x] = direction
+                        return True
+            return False
+
+        for direction in sorted(self.directions, key=lambda d: len(d.row)):
+            match(direction, set())
+        found = {direction: x for x, direction in by_state.items()}
+        return {direction: found[direction] for direction in self.directions}
 
     def _ratio(self, velocity: Value, row: dict[Value, Value], other: Direction) -> Value | None:
         """Return a velocity over that of a direction, if that is fixed."""
@@ -290,10 +326,7 @@ class Builder:
         )
         response, accelerations, plain = [], [], []
         for direction in self.directions:
-            own = direction.contacts[0]
-            _, offset = self._row(own, "velocity", direction.velocity)
-            (jerk,) = graph.derivatives([offset], {graph.value("time"): self.one})
-            total, whole = jerk, jerk
+            total = whole = self._rate_of_offset(direction)
             for x, factor in direction.row.items():
                 whole = self._plus(whole, self._times(factor, self.rates[x]))
                 total = self._plus(total, self._times(factor, free[self.rates[x]]))
@@ -333,6 +366,9 @@ class Builder:
                 text = f"more than {MOST_COUPLED} velocities are held together: {names}"
                 raise ContactError(self.directions[block[0]].contacts[0], "force", text)
         return blocks
+
+    def _rate_of_offset(self, direction: Direction) -> Value:
+        return self.graph.derivatives([direction.offset], {self.graph.value("time"): self.one})[0]
 
     def _column(self, direction: Direction, row: list[Value]) -> Value:
         """Return the response of an acceleration to the force that holds a direction."""
@@ -450,9 +486,8 @@ class Builder:
                 return None
             if x not in owners or x in done:
                 return found[x]
-            direction, total = owners[x], self.zero
-            _, offset = self._row(direction.contacts[0], "velocity", direction.velocity)
-            (total,) = self.graph.derivatives([offset], {self.graph.value("time"): self.one})
+            direction = owners[x]
+            total = self._rate_of_offset(direction)
             for other, factor in direction.row.items():
                 if other is not x:
                     rate = finish(other, (*above, x))
@@ -550,6 +585,26 @@ class Builder:
         if b.op == "number" and b.number == -1.0:
             return self.graph.negative(a)
         return self.graph.simple("/", a, b)
+
+
+def _number(factor: Value) -> Fraction:
+    """Return a factor as an exact number, with any number for each leaf."""
+    if factor.op == "number":
+        return Fraction(factor.number)
+    given = [_number(argument) for argument in factor.arguments]
+    match factor.op:
+        case "+":
+            return given[0] + given[1]
+        case "-":
+            return given[0] - given[1]
+        case "*":
+            return given[0] * given[1]
+        case "/" if given[1]:
+            return given[0] / given[1]
+        case "negative":
+            return -given[0]
+    text = f"{factor.op} {factor.name} {' '.join(map(str, given))}"
+    return Fraction(1 + zlib.crc32(text.encode()), 2**30)
 
 
 def _is_zero(value: Value) -> bool:

@@ -1,4 +1,4 @@
-"""Dry friction and stops in C (src/model/contacts.h): their tables, limits and what decides them."""
+"""Dry friction and stops in C (src/model/contacts.h): tables, limits and what decides them."""
 
 from collections.abc import Sequence
 
@@ -121,9 +121,9 @@ def _direction_row(file: ModelFile, direction: Direction, states: dict[Value, in
 
 
 def _measure(file: ModelFile, leaves: Leaves) -> list[str]:
-    found, graph, code = file.graph.contacts, file.graph, Code(leaves)
+    found, code = file.graph.contacts, Code(leaves)
     states = {x.leaf: i for i, x in enumerate(file.of("states"))}
-    count, zero = len(found.contacts), graph.number(0.0)
+    count = len(found.contacts)
     values: dict[Place, Value | Operand] = {}
     sums: list[Statement] = []
     for k, direction in enumerate(found.directions):
