@@ -12,6 +12,7 @@ from typing import Any
 
 from .expressions.parser import LONGEST
 from .graph.tables import INTERPOLATIONS, OUTSIDE
+from .read import contacts
 from .read import keys as reader
 from .read.arrays import FOR
 from .read.content import BOOLEAN, FOLLOWS, INTEGER, SWITCHES
@@ -56,6 +57,7 @@ KEYS: dict[str, Schema] = {  # start: by the type
     "where": {"type": "object", "propertyNames": WORD, "additionalProperties": EXPRESSION},
     **dict.fromkeys(("derivative", "value", "equation", "when", "while"), EXPRESSION),
     **dict.fromkeys(("every", "offset", FOR), EXPRESSION),
+    **dict.fromkeys((*reader.FRICTION, *reader.STOPS), EXPRESSION),
     "terminate": TEXT | {"minLength": 1, "maxLength": reader.LONGEST_MESSAGE},
     "nominal": ABOVE_0,
     "start": {},
@@ -137,12 +139,26 @@ def _further(named: Schema) -> dict[str, Schema]:
         "functions": _by_name(function, of_functions, has_indexes=False),
         "sampled": _by_name(_change(reader.SAMPLER), named),
         "events": _by_name(_change(reader.EVENT), named),
+        "friction": _by_name(_friction(), {}),
+        "stops": _by_name(_stops(), {}),
         "check": {"type": "object"} | check,
         "terminals": TERMINALS,
         "hook": _hook(),
         "components": _components(),
         "connections": {"type": "object"},
     }
+
+
+def _friction() -> Schema:
+    """Return the schema of an element of [friction]: breakaway and stribeck come together."""
+    needed = {"breakaway": ["stribeck"], "stribeck": ["breakaway"]}
+    found = _keys(reader.FRICTION, *contacts.NEEDED[contacts.FRICTION])
+    return found | {"dependentRequired": needed}
+
+
+def _stops() -> Schema:
+    found = _keys(reader.STOPS, *contacts.NEEDED[contacts.STOPS])
+    return found | {"anyOf": [{"required": ["lower"]}, {"required": ["upper"]}]}
 
 
 def _components() -> Schema:

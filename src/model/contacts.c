@@ -60,6 +60,13 @@ static double *states_of(const struct work *work) {
     return (double *)(void *)((char *)work->call->values + work->call->model->states);
 }
 
+/* Sets a state, from then on without an error. */
+static void set_state(struct work *work, size_t i, double value) {
+    states_of(work)[i] = value;
+    work->call->room.tolerance[i] = 0.0;
+    work->jumps = true;
+}
+
 static int *mode_of(const struct work *work, int contact) {
     const struct call *call = work->call;
     return &call->segments[call->model->segment_count + work->model->contact[contact].count];
@@ -99,11 +106,16 @@ static double response(const struct work *work, int to, int of) {
 
 /* ---- Checks --------------------------------------------------------------------------------- */
 
+/* Refuses a value; limit: of what `wanted` ends with, or NULL. */
 static enum status refuse(const struct work *work, const char *name, const char *what, double value,
-                          const char *wanted) {
+                          const char *wanted, const double *limit) {
     if (work->event != NULL && work->event->reason != NULL) {
+        char more[40] = "";
+        if (limit != NULL) {
+            (void)snprintf(more, sizeof more, " = %.9g", *limit);
+        }
         (void)snprintf(work->event->reason, work->event->reason_size,
-                       "%s: %s = %.9g is refused: %s", name, what, value, wanted);
+                       "%s: %s = %.9g is refused: %s%s", name, what, value, wanted, more);
     }
     return STATUS_INVALID_PARAMETERS;
 }
@@ -112,14 +124,15 @@ static enum status check_friction(const struct work *work, int e) {
     const struct contacts_measured *now = &work->now;
     const char *name = work->model->contact[e].name;
     if (!(now->coulomb[e] >= 0.0)) {
-        return refuse(work, name, "coulomb", now->coulomb[e], "it must be 0 or more");
+        return refuse(work, name, "coulomb", now->coulomb[e], "it must be 0 or more", NULL);
     }
     if (!(now->breakaway[e] >= now->coulomb[e])) {
-        return refuse(work, name, "breakaway", now->breakaway[e], "it must not be below coulomb");
+        return refuse(work, name, "breakaway", now->breakaway[e], "it must not be below coulomb",
+                      &now->coulomb[e]);
     }
     if (now->breakaway[e] > now->coulomb[e] && !(now->stribeck[e] > 0.0)) {
         return refuse(work, name, "stribeck", now->stribeck[e],
-                      "it must be above 0 where breakaway is above coulomb");
+                      "it must be above 0 where breakaway is above coulomb", &now->coulomb[e]);
     }
     return STATUS_OK;
 }
@@ -129,20 +142,35 @@ static enum status check_stops(const struct work *work, int e, bool is_start) {
     const struct contact *contact = &work->model->contact[e];
     if (!(now->restitution[e] >= 0.0 && now->restitution[e] <= 1.0)) {
         return refuse(work, contact->name, "restitution", now->restitution[e],
-                      "it must be from 0 to 1");
+                      "it must be from 0 to 1", NULL);
     }
     if (contact->has_lower && contact->has_upper && !(now->lower[e] < now->upper[e])) {
-        return refuse(work, contact->name, "lower", now->lower[e], "it must be below upper");
+        return refuse(work, contact->name, "lower", now->lower[e], "it must be below upper",
+                      &now->upper[e]);
     }
     if (is_start && contact->has_lower && now->position[e] < now->lower[e]) {
         return refuse(work, contact->name, "position", now->position[e],
-                      "a start must not be below lower");
+                      "a start must not be below lower", &now->lower[e]);
     }
     if (is_start && contact->has_upper && now->position[e] > now->upper[e]) {
         return refuse(work, contact->name, "position", now->position[e],
-                      "a start must not be above upper");
+                      "a start must not be above upper", &now->upper[e]);
     }
     return STATUS_OK;
+}
+
+/* Checks that the force of friction slows its velocity down, and that of stops speeds it up. */
+static enum status check_response(const struct work *work, int e) {
+    const struct contact *contact = &work->model->contact[e];
+    const double own = work->now.ratio[e] *
+                       work->now.response[contact->direction * work->model->contact_count + e];
+    if (contact->is_friction ? own < 0.0 : own > 0.0) {
+        return STATUS_OK;
+    }
+    return refuse(work, contact->name, "der(velocity) by force", own,
+                  contact->is_friction ? "friction acts against its velocity, so below 0"
+                                       : "the force of stops acts along their velocity, so above 0",
+                  NULL);
 }
 
 static enum status check(const struct work *work, bool is_start) {
@@ -151,6 +179,7 @@ static enum status check(const struct work *work, bool is_start) {
         if (work->now.active[e] != 0.0) {
             status = work->model->contact[e].is_friction ? check_friction(work, e)
                                                          : check_stops(work, e, is_start);
+            status = status == STATUS_OK ? check_response(work, e) : status;
         }
     }
     return status;
@@ -190,10 +219,10 @@ static void rest_exactly(struct work *work, const int at_rest[]) {
     for (int pass = 0; pass < count && changes; pass++) {
         changes = false;
         for (int k = 0; k < count; k++) {
-            double *own = &states_of(work)[work->model->direction[k].own];
-            if (at_rest[k] && *own != work->now.rest[k]) {
-                *own = work->now.rest[k];
-                work->jumps = changes = true;
+            const size_t own = work->model->direction[k].own;
+            if (at_rest[k] && states_of(work)[own] != work->now.rest[k]) {
+                set_state(work, own, work->now.rest[k]);
+                changes = true;
                 measure(work);
             }
         }
@@ -268,11 +297,9 @@ static void place_on_stops(struct work *work) {
         if (stop == STOPS_FREE) {
             continue;
         }
-        double *place = &states_of(work)[contact->position];
         const double at = stop == STOPS_LOWER ? work->now.at_lower[e] : work->now.at_upper[e];
-        if (*place != at) {
-            *place = at;
-            work->jumps = true;
+        if (states_of(work)[contact->position] != at) {
+            set_state(work, contact->position, at);
             measure(work);
         }
         if (work->sense[contact->direction] == 0) {
@@ -375,7 +402,7 @@ static bool decide(struct work *work) {
 static void apply_impulses(struct work *work, const double P[], const int is_struck[],
                            const double restitution[]) {
     const int contacts = work->model->contact_count;
-    double *x = states_of(work);
+    const double *x = states_of(work);
     for (int k = 0; k < work->model->direction_count; k++) {
         if (!is_struck[k]) {
             continue;
@@ -384,7 +411,8 @@ static void apply_impulses(struct work *work, const double P[], const int is_str
         const struct contact *contact = &work->model->contact[e];
         const double impulse = P[k] / work->now.ratio[e];
         for (int i = 0; i < work->model->moved_count; i++) {
-            x[work->model->moved[i]] += work->now.jump[i * contacts + e] * impulse;
+            const size_t state = work->model->moved[i];
+            set_state(work, state, x[state] + work->now.jump[i * contacts + e] * impulse);
         }
         double *of_instant = double_at(work, contact->impulse);
         *of_instant = (work->struck[e] ? *of_instant : 0.0) + impulse;
@@ -397,13 +425,12 @@ static void apply_impulses(struct work *work, const double P[], const int is_str
         for (int k = 0; k < count; k++) {
             if (is_struck[k]) {
                 const double velocity = 0.0 - restitution[k] * work->before[k];
-                x[work->model->direction[k].own] =
-                    work->now.rest[k] + velocity / work->now.factor[k];
+                set_state(work, work->model->direction[k].own,
+                          work->now.rest[k] + velocity / work->now.factor[k]);
                 measure(work);
             }
         }
     }
-    work->jumps = true;
     find_rest_now(work);
 }
 

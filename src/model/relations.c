@@ -10,53 +10,6 @@ static const double location_error = 1e-11;
 static const double shortest_period = 1e-12;  // s, of samplers
 static const double part_of_period = 0x1p-40; // that counts as rounding
 
-/* Decides contacts, and relations with them, until none of them changes. */
-static enum status follow_contacts(const struct call *call, const struct event *event,
-                                   bool is_first, bool is_start, bool *changes) {
-    enum { MOST_ROUNDS = 20 };
-    const struct relations *model = call->model;
-    const bool is_read = model->relation_count > 0 || model->segment_count > 0;
-    enum status status = STATUS_OK;
-    bool differs = model->contacts != NULL;
-    for (int count = 0; differs && status == STATUS_OK && count < MOST_ROUNDS; count++) {
-        differs = false;
-        status = contacts_update(call, event, is_first && count == 0, is_start, &differs);
-        if (differs && status == STATUS_OK && is_read) {
-            modes_settle(call);
-        }
-        *changes |= differs;
-        differs = differs && is_read;
-    }
-    if (differs && status == STATUS_OK) {
-        if (event != NULL && event->reason != NULL) {
-            (void)snprintf(event->reason, event->reason_size,
-                           "friction or stops and conditions change each other without end");
-        }
-        return STATUS_INTERNAL;
-    }
-    return status;
-}
-
-const void *relations_followed(const struct relations *model, struct relations_room room,
-                               const void *values, double t, void *copy) {
-    const int is_begun = *relations_modes(model, values);
-    if (is_begun && !model->has_inputs) {
-        return values;
-    }
-    memcpy(copy, values, model->values_size);
-    if (!is_begun && model->start != NULL) {
-        model->start(copy);
-    }
-    const struct call call = modes_call(model, room, copy, t, room.zeros, NULL);
-    if (is_begun) {
-        modes_follow_inputs(&call);
-    } else {
-        modes_begin(&call);
-        (void)follow_contacts(&call, NULL, false, false, &(bool){false});
-    }
-    return copy;
-}
-
 static const double *states_in(const struct relations *model, const void *values) {
     return (const double *)(const void *)((const char *)values + model->states);
 }
@@ -183,13 +136,8 @@ static void allow_rounding(const struct call *call, bool is_allowed) {
     }
 }
 
-/* Performs an event or a sampler, and updates all modes. */
-static enum status perform(const struct call *call, int number, const struct event *event) {
-    modes_compare(call, call->room.tolerance, call->room.before);
-    const enum status status = assign(call, number, event);
-    if (status != STATUS_OK) {
-        return status;
-    }
+/* Updates all modes after a change of values; call->room.before: the relations before it. */
+static void follow_change(const struct call *call) {
     update_timed_modes(call);
     modes_settle(call);
     allow_rounding(call, true);
@@ -197,6 +145,16 @@ static enum status perform(const struct call *call, int number, const struct eve
     allow_rounding(call, false);
     modes_settle(call);
     modes_clear_turned(call);
+}
+
+/* Performs an event or a sampler, and updates all modes. */
+static enum status perform(const struct call *call, int number, const struct event *event) {
+    modes_compare(call, call->room.tolerance, call->room.before);
+    const enum status status = assign(call, number, event);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    follow_change(call);
     return STATUS_OK;
 }
 
@@ -389,6 +347,56 @@ static enum status start_samplers(const struct call *call, const struct event *e
         discrete_of(call)[0] = event->t;
     }
     return STATUS_OK;
+}
+
+/* Decides contacts, and relations with them, until none of them changes. */
+static enum status follow_contacts(const struct call *call, const struct event *event,
+                                   bool is_first, bool is_start, bool *changes) {
+    enum { MOST_ROUNDS = 20 };
+    const struct relations *model = call->model;
+    const bool is_read = model->relation_count > 0 || model->segment_count > 0;
+    enum status status = STATUS_OK;
+    bool differs = model->contacts != NULL;
+    for (int count = 0; differs && status == STATUS_OK && count < MOST_ROUNDS; count++) {
+        differs = false;
+        if (is_read) {
+            modes_compare(call, call->room.tolerance, call->room.before);
+        }
+        status = contacts_update(call, event, is_first && count == 0, is_start, &differs);
+        if (differs && status == STATUS_OK && is_read) {
+            follow_change(call);
+        }
+        *changes |= differs;
+        differs = differs && is_read;
+    }
+    if (differs && status == STATUS_OK) {
+        if (event != NULL && event->reason != NULL) {
+            (void)snprintf(event->reason, event->reason_size,
+                           "friction or stops and conditions change each other without end");
+        }
+        return STATUS_INTERNAL;
+    }
+    return status;
+}
+
+const void *relations_followed(const struct relations *model, struct relations_room room,
+                               const void *values, double t, void *copy) {
+    const int is_begun = *relations_modes(model, values);
+    if (is_begun && !model->has_inputs) {
+        return values;
+    }
+    memcpy(copy, values, model->values_size);
+    if (!is_begun && model->start != NULL) {
+        model->start(copy);
+    }
+    const struct call call = modes_call(model, room, copy, t, room.zeros, NULL);
+    if (is_begun) {
+        modes_follow_inputs(&call);
+    } else {
+        modes_begin(&call);
+        (void)follow_contacts(&call, NULL, false, false, &(bool){false});
+    }
+    return copy;
 }
 
 enum status relations_update(const struct relations *model, struct relations_room room,

@@ -59,12 +59,19 @@ def flattened(table: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
     return found
 
 
+def is_loop(tables: Mapping[str, Any]) -> bool:
+    """Return whether a file has keys that only loop files have; [stop] means [stops]."""
+    return any(
+        key in tables and not (key == "stop" and isinstance(tables[key], dict)) for key in LOOP
+    )
+
+
 def of_loop(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables of a loop file as those of a file with equations.
 
     Its parameters are start values of the components, its inputs those of the whole.
     """
-    if not any(key in tables for key in LOOP):
+    if not is_loop(tables):
         return dict(tables)
     for key in tables:
         if key not in OF_LOOP:
@@ -106,7 +113,7 @@ def _seconds(value: object) -> object:
 
 def check_loop(tables: Mapping[str, Any], file: ModelFile) -> None:
     """Check the names in a loop file of what only `system` uses: signals, variants, `keep`."""
-    if not any(key in tables for key in LOOP):
+    if not is_loop(tables):
         return
     for name in _ends(tables.get("inputs", {})):
         with placed("[inputs]", name):

@@ -61,13 +61,13 @@ def read(
             )
         if "stribeck" in given and "breakaway" not in given:
             raise ModelFileError("stribeck: expected breakaway, too, the friction at rest")
-        with placed("force"):
-            text = given.pop("force")
-            expression = file.expression(element, (place, "force"), text, None)
-            if expression.tree.op != "name":
-                raise ModelFileError(f"expected a name that the equations use, got {text!r}")
-            force = expression.tree.name
-            check_name(force, file)
+    text = given.pop("force")
+    expression = file.expression(element, (place, "force"), text, None)
+    with placed(place, "force"):
+        if expression.tree.op != "name":
+            raise ModelFileError(f"expected a name that the equations use, got {text!r}")
+        force = expression.tree.name
+        check_name(force, file)
     found = {
         key: file.expression(
             element, (place, key), text, CONDITION if key == "while" else NUMBER

@@ -23,6 +23,7 @@ FOLLOWS = "calculated"  # section of parameters that follow from others
 # of parameters, inputs and discrete variables that are no real numbers
 ALGEBRAIC = "algebraic"  # unknowns of equations
 FORCES = "forces"  # unknowns of contacts
+FIXED_LIMITS = ("lower", "upper")
 OPTIONS, SWITCHES, COUNTS = "options", "switches", "counts"
 WRITTEN = {  # where files have them
     FOLLOWS: "parameters",
@@ -210,6 +211,16 @@ class Contact:
     force: str
     given: dict[str, Expression]  # by key
 
+    @property
+    def fixed(self) -> list[Expression]:
+        """Expressions of parameters only."""
+        return [e for key, e in self.given.items() if key in FIXED_LIMITS]
+
+    @property
+    def moving(self) -> list[Expression]:
+        """All others."""
+        return [e for key, e in self.given.items() if key not in FIXED_LIMITS]
+
     def variable(self, key: str) -> str:
         """Return the name of a variable that it has."""
         return f"{self.name}.{key}"
@@ -366,7 +377,7 @@ class ModelFile:
         unknowns, *others = CALCULATED
         found = [v.expression for v in self.of(unknowns, others[0], "states", *others[1:])]
         found += [v.guess for v in self.of(*CALCULATED) if v.guess is not None]
-        found += [e for contact in self.contacts for e in contact.given.values()]
+        found += [e for contact in self.contacts for e in contact.moving]
         return found + [expression for change in self.changes for expression in change.expressions]
 
     @property
@@ -374,7 +385,7 @@ class ModelFile:
         """All expressions of parameters only."""
         found = [v.expression for v in self.of(FOLLOWS)]
         found += [e for s in self.sampled for e in s.periods]
-        return found
+        return found + [e for contact in self.contacts for e in contact.fixed]
 
     @property
     def checked(self) -> list[Expression]:

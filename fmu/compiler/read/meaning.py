@@ -164,7 +164,7 @@ def _in_order(file: ModelFile) -> list[Expression]:
         variables += [v.expression for v in members]
     happening = [expression for change in file.changes for expression in change.expressions]
     constant = [e for e in [*file.constant, *file.initial] if e.target not in entries]
-    of_contacts = [e for contact in file.contacts for e in contact.given.values()]
+    of_contacts = [e for contact in file.contacts for e in contact.moving]
     return [*variables, *of_contacts, *happening, *constant, *file.checked]
 
 

@@ -147,6 +147,8 @@ def _measure(file: ModelFile, leaves: Leaves) -> list[str]:
     code.assign(values)
     for k, direction in enumerate(found.directions):
         terms = [("fabs", ("*", code.of(f), code.of(x))) for x, f in direction.row.items()]
+        if direction.offset.leaves:
+            terms.append(("fabs", code.of(direction.offset)))
         sums.append(store(Place("to->size[", k, "]"), _sum(terms)))
     for e, contact in enumerate(found.contacts):
         terms = [
