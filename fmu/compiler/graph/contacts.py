@@ -7,6 +7,8 @@ src/model/contacts.c decides what is held.
 
 from __future__ import annotations
 
+import math
+import operator
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,6 +16,7 @@ from fractions import Fraction
 from functools import partial, reduce
 from typing import TYPE_CHECKING
 
+from ..expressions.expression import in_order
 from . import algebraic
 from .algebraic import replaced
 
@@ -25,6 +28,22 @@ FREE, LOWER, UPPER = 1, 2, 3  # modes of stops
 MOST_COUPLED = 8  # src/model/contacts.h
 STILL = ("parameter", "integer", "mode", "discrete")  # leaves of factors
 OF_OFFSETS = (*STILL, "time")
+SAMPLES = 8
+CALCULATED = {
+    **dict(zip("+-*/", (operator.add, operator.sub, operator.mul, operator.truediv), strict=True)),
+    **dict(
+        zip(
+            ("<", "<=", ">", ">=", "=="),
+            (operator.lt, operator.le, operator.gt, operator.ge, operator.eq),
+            strict=True,
+        )
+    ),
+    "negative": operator.neg,
+    "not": operator.not_,
+    "and": lambda a, b: a and b,
+    "or": lambda a, b: a or b,
+    "if": lambda condition, a, b: a if condition else b,
+}
 
 
 @dataclass(eq=False)
@@ -71,7 +90,8 @@ class Direction:
 class Limit:
     """A distance that is above 0 while modes are valid, with another one for some modes."""
 
-    name: str
+    contact: str
+    key: str
     number: int  # of its contact
     used: Value | None
     cases: tuple[Value | None, Value, Value]  # condition, distance if it holds, else
@@ -253,10 +273,8 @@ class Builder:
         (rate,) = graph.derivatives([position], self.rates | {graph.value("time"): self.one})
         if rate.leaves & self.forces.keys():
             raise ContactError(contact, "position", "has no velocity: a force acts on its rate")
-        of_rate = self._row(contact, "position", rate)
-        if of_rate != (row, rest):
-            text = "must be the rate of position, written in the same way"
-            raise ContactError(contact, "velocity", text)
+        if not are_equal(rate, contact.given["velocity"]):
+            raise ContactError(contact, "velocity", "is not the rate of position")
         own = min(places, key=lambda x: places[x].op not in ("number", "negative"))
         contact.place = own, self._solved_for(own, places, offset)
         contact.tolerances = places
@@ -409,8 +427,8 @@ class Builder:
                 continue
             elements = {}
             for i, k in enumerate(block):
-                for j, l in enumerate(block):
-                    column = self._column(self.directions[l], found.response[k])
+                for j, other in enumerate(block):
+                    column = self._column(self.directions[other], found.response[k])
                     if i == j or not _is_zero(column):
                         diagonal = self.one if i == j else self.zero
                         elements[i, j] = self._if(self.directions[k].held, column, diagonal)
@@ -530,7 +548,7 @@ class Builder:
                         used = graph.value("and", contact.active, used)
                     pushes = force if sign > 0 else graph.negative(force)
                     cases = (is_closed, pushes, distance)
-                    found.append(Limit(f"{contact.name}.{key}", number, used, cases))
+                    found.append(Limit(contact.name, key, number, used, cases))
         return found
 
     def _limits_of_friction(
@@ -561,8 +579,8 @@ class Builder:
         left = graph.value("+", limit, direction.hold)
         right = graph.value("-", limit, direction.hold)
         return [
-            Limit(f"{contact.name}.forward", number, first, (stuck, left, moves)),
-            Limit(f"{contact.name}.backward", number, second, (None, right, right)),
+            Limit(contact.name, "forward", number, first, (stuck, left, moves)),
+            Limit(contact.name, "backward", number, second, (None, right, right)),
         ]
 
     # ---- Operations ------------------------------------------------------------------------------
@@ -605,6 +623,38 @@ def _number(factor: Value) -> Fraction:
             return -given[0]
     text = f"{factor.op} {factor.name} {' '.join(map(str, given))}"
     return Fraction(1 + zlib.crc32(text.encode()), 2**30)
+
+
+def are_equal(a: Value, b: Value) -> bool:
+    """Return whether two values are equal wherever their leaves are, as far as samples show it."""
+    if a is b:
+        return True
+    for sample in range(SAMPLES):
+        found: dict[Value, float] = {}
+        for value in in_order([a, b]):
+            given = [found[argument] for argument in value.arguments]
+            try:
+                found[value] = _at(value, given, sample)
+            except (ArithmeticError, ValueError):
+                found[value] = math.nan
+            except KeyError:  # tables and systems
+                return False
+        x, y = found[a], found[b]
+        if math.isfinite(x) and math.isfinite(y) and abs(x - y) > 1e-9 * (abs(x) + abs(y)):
+            return False
+    return True
+
+
+def _at(value: Value, given: list[float], sample: int) -> float:
+    """Return a value from those of its arguments, of a leaf one that its name gives."""
+    if value.op in CALCULATED:
+        return CALCULATED[value.op](*given)
+    if value.op == "number":
+        return value.number
+    if value.arguments:
+        return getattr(math, value.op)(*given) if hasattr(math, value.op) else {}[value.op]
+    text = f"{sample} {value.op} {value.name}"
+    return 1 + zlib.crc32(text.encode()) / 2**31 if value.op != "mode" else sample % 2
 
 
 def _is_zero(value: Value) -> bool:

@@ -17,6 +17,7 @@ from .content import (
     ModelFileError,
     Variable,
     placed,
+    variable_of,
 )
 
 FRICTION, STOPS = "friction", "stops"
@@ -82,8 +83,12 @@ def read(
 def _declare(file: ModelFile, section: str, name: str, force: str) -> None:
     """Declare what the FMU shows of an element."""
     items = keys.Items(MODES[section])
-    own = [Variable(f"{name}.mode", COUNTS, kind=items, start=1.0, description=f"Mode of {name}")]
-    of_force = Variable(f"{name}.force", "outputs", description=f"Force of {name}")
+    own = [
+        Variable(
+            variable_of(name, "mode"), COUNTS, kind=items, start=1.0, description=f"Mode of {name}"
+        )
+    ]
+    of_force = Variable(variable_of(name, "force"), "outputs", description=f"Force of {name}")
     place = (f"[{name}]", "force")
     of_force.expression = Expression(
         place, force, Node("name", 1, name=force), NUMBER, of_force.name
@@ -92,7 +97,7 @@ def _declare(file: ModelFile, section: str, name: str, force: str) -> None:
     if section == STOPS:
         texts = {"impulse": "Impulse of the last impact", "loss": "Energy lost in all impacts"}
         own += [
-            Variable(f"{name}.{key}", "discrete", start=0.0, description=f"{text} of {name}")
+            Variable(variable_of(name, key), "discrete", start=0.0, description=f"{text} of {name}")
             for key, text in texts.items()
         ]
     for variable in own:

@@ -223,7 +223,13 @@ class Contact:
 
     def variable(self, key: str) -> str:
         """Return the name of a variable that it has."""
-        return f"{self.name}.{key}"
+        return variable_of(self.name, key)
+
+
+def variable_of(contact: str, key: str) -> str:
+    """Return the name of a variable of a contact; those of an array are one themselves."""
+    base, bracket, index = contact.partition("[")
+    return f"{base}.{key}{bracket}{index}"
 
 
 @dataclass(frozen=True)

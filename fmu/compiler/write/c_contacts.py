@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ..graph.contacts import Contact, Direction, Limit
 from ..graph.graph import Value
-from ..read.content import ModelFile
+from ..read.content import ModelFile, variable_of
 from .c_code import Code, Leaves
 from .c_text import filled, text
 from .errors import Errors
@@ -102,13 +102,13 @@ def _contact_row(file: ModelFile, contact: Contact, states: dict[Value, int]) ->
         str(contact.is_friction).lower(),
         *(str(key in contact.given).lower() for key in ("lower", "upper")),
         str(direction),
-        str(numbers[f"{contact.name}.mode"]),
+        str(numbers[variable_of(contact.name, "mode")]),
     ]
     if contact.is_friction:
         return f"{{{', '.join([*own, '0', '0', '0'])}}},"
     own.append(str(states[contact.place[0]]))
     for key in ("impulse", "loss"):
-        field = file.fields.value(f"{contact.name}.{key}")
+        field = file.fields.value(variable_of(contact.name, key))
         own.append(f"offsetof(struct equations_values, {field})")
     return f"{{{', '.join(own)}}},"
 

@@ -314,7 +314,7 @@ class Events:
             descriptions=self._describe(),
             names=", ".join(
                 [text(file.relation_texts[places[r.name]][:100]) for r in self.located]
-                + [text(limit.name) for limit in self.limits]
+                + [text(f"{limit.contact}.{limit.key}") for limit in self.limits]
                 or ["NULL"]
             ),
         ).splitlines()

@@ -25,6 +25,7 @@ from ..read.content import (
     ModelFile,
     Variable,
     placed,
+    variable_of,
 )
 from ..read.keys import NUMBERS
 from ..units import ANGLE, BASE, STANDARD, Exponents, parsed, shown
@@ -81,7 +82,9 @@ def _indicators(file: ModelFile) -> dict[str, Value]:
             name += "_"
         found[name] = relation.distance
     limits = c_contacts.limits(file)
-    return found | {limit.name: c_contacts.distance(file, limit) for limit in limits}
+    return found | {
+        variable_of(limit.contact, limit.key): c_contacts.distance(file, limit) for limit in limits
+    }
 
 
 def generated(file: ModelFile) -> dict[str, str]:
