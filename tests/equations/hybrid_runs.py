@@ -49,7 +49,7 @@ class Unit:
         self.references = {name: v.reference for name, v in declared.variables.items()}
         self.states = [v.name for v in file.of("states")]
         self.unknowns = [name for block in file.blocks.values() for name in block.unknowns]
-        self.indicators = len(file.graph.located)
+        self.indicators = len(declared.indicators)
 
     def instance(self, kind: type) -> Any:
         """An instance of a class of fmpy, not yet instantiated."""
