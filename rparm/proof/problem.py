@@ -95,6 +95,9 @@ class Problem:
         for name in inputs.keys() - {*self.inputs}:
             if np.any(inputs[name] != inputs[name][0]):
                 self._fail(f"inputs.{name}: expected a constant value of what is no real number")
+        if model.contacts:
+            name = model.contacts[0].name
+            self._fail(f"{name}: nothing can be proven of a motion with friction or stops")
         outputs = [v for v in model.of("outputs") if v.is_real] if with_outputs else []
         self.names = (*self.states, *(v.name for v in outputs))
         self.tables = {

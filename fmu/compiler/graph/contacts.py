@@ -7,18 +7,15 @@ src/model/contacts.c decides what is held.
 
 from __future__ import annotations
 
-import math
-import operator
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial, reduce
 from typing import TYPE_CHECKING
 
-from ..expressions.expression import in_order
 from . import algebraic
 from .algebraic import replaced
+from .samples import are_equal, exact
 
 if TYPE_CHECKING:
     from .graph import Graph, Value
@@ -28,22 +25,6 @@ FREE, LOWER, UPPER = 1, 2, 3  # modes of stops
 MOST_COUPLED = 8  # src/model/contacts.h
 STILL = ("parameter", "integer", "mode", "discrete")  # leaves of factors
 OF_OFFSETS = (*STILL, "time")
-SAMPLES = 8
-CALCULATED = {
-    **dict(zip("+-*/", (operator.add, operator.sub, operator.mul, operator.truediv), strict=True)),
-    **dict(
-        zip(
-            ("<", "<=", ">", ">=", "=="),
-            (operator.lt, operator.le, operator.gt, operator.ge, operator.eq),
-            strict=True,
-        )
-    ),
-    "negative": operator.neg,
-    "not": operator.not_,
-    "and": lambda a, b: a and b,
-    "or": lambda a, b: a or b,
-    "if": lambda condition, a, b: a if condition else b,
-}
 
 
 @dataclass(eq=False)
@@ -206,7 +187,7 @@ class Builder:
         """Check that no velocity follows from others, by elimination with any parameters."""
         done: list[tuple[Value, dict[Value, Fraction], set[int]]] = []  # with pivot and members
         for k, direction in enumerate(self.directions):
-            row, of = {x: _number(factor) for x, factor in direction.row.items()}, {k}
+            row, of = {x: exact(factor) for x, factor in direction.row.items()}, {k}
             for pivot, other, members in done:
                 if factor := row.get(pivot):
                     scale = factor / other[pivot]
@@ -603,58 +584,6 @@ class Builder:
         if b.op == "number" and b.number == -1.0:
             return self.graph.negative(a)
         return self.graph.simple("/", a, b)
-
-
-def _number(factor: Value) -> Fraction:
-    """Return a factor as an exact number, with any number for each leaf."""
-    if factor.op == "number":
-        return Fraction(factor.number)
-    given = [_number(argument) for argument in factor.arguments]
-    match factor.op:
-        case "+":
-            return given[0] + given[1]
-        case "-":
-            return given[0] - given[1]
-        case "*":
-            return given[0] * given[1]
-        case "/" if given[1]:
-            return given[0] / given[1]
-        case "negative":
-            return -given[0]
-    text = f"{factor.op} {factor.name} {' '.join(map(str, given))}"
-    return Fraction(1 + zlib.crc32(text.encode()), 2**30)
-
-
-def are_equal(a: Value, b: Value) -> bool:
-    """Return whether two values are equal wherever their leaves are, as far as samples show it."""
-    if a is b:
-        return True
-    for sample in range(SAMPLES):
-        found: dict[Value, float] = {}
-        for value in in_order([a, b]):
-            given = [found[argument] for argument in value.arguments]
-            try:
-                found[value] = _at(value, given, sample)
-            except (ArithmeticError, ValueError):
-                found[value] = math.nan
-            except KeyError:  # tables and systems
-                return False
-        x, y = found[a], found[b]
-        if math.isfinite(x) and math.isfinite(y) and abs(x - y) > 1e-9 * (abs(x) + abs(y)):
-            return False
-    return True
-
-
-def _at(value: Value, given: list[float], sample: int) -> float:
-    """Return a value from those of its arguments, of a leaf one that its name gives."""
-    if value.op in CALCULATED:
-        return CALCULATED[value.op](*given)
-    if value.op == "number":
-        return value.number
-    if value.arguments:
-        return getattr(math, value.op)(*given) if hasattr(math, value.op) else {}[value.op]
-    text = f"{sample} {value.op} {value.name}"
-    return 1 + zlib.crc32(text.encode()) / 2**31 if value.op != "mode" else sample % 2
 
 
 def _is_zero(value: Value) -> bool:
