@@ -388,6 +388,7 @@ static void apply_impulses(struct work *work, const double P[], const int is_str
         }
         double *of_instant = double_at(work, contact->impulse);
         *of_instant = (work->struck[e] ? *of_instant : 0.0) + impulse;
+        *double_at(work, contact->impulses) += impulse;
         *double_at(work, contact->loss) -= 0.5 * P[k] * (1.0 - restitution[k]) * work->before[k];
         work->struck[e] = 1;
     }

@@ -22,9 +22,9 @@ struct contact {
     const char *name;
     bool is_friction, has_lower, has_upper;
     int direction;
-    int count;            /* of the model that is its mode */
-    size_t position;      /* of stops: state that is set where one is reached */
-    size_t impulse, loss; /* of stops: offsets of these in the values */
+    int count;                      /* of the model that is its mode */
+    size_t position;                /* of stops: state that is set where one is reached */
+    size_t impulse, impulses, loss; /* of stops: offsets of these in the values */
 };
 
 struct direction {

@@ -105,9 +105,9 @@ def _contact_row(file: ModelFile, contact: Contact, states: dict[Value, int]) ->
         str(numbers[f"{contact.name}.mode"]),
     ]
     if contact.is_friction:
-        return f"{{{', '.join([*own, '0', '0', '0'])}}},"
+        return f"{{{', '.join([*own, '0', '0', '0', '0'])}}},"
     own.append(str(states[contact.place[0]]))
-    for key in ("impulse", "loss"):
+    for key in ("impulse", "impulses", "loss"):
         field = file.fields.value(f"{contact.name}.{key}")
         own.append(f"offsetof(struct equations_values, {field})")
     return f"{{{', '.join(own)}}},"
