@@ -12,6 +12,9 @@
 
 #include "model.h"
 
+struct given;
+struct compared;
+
 enum { CONTACTS_MOST_COUPLED = 8 };
 
 /* Modes of friction and of stops. */
@@ -61,6 +64,9 @@ struct contacts {
     /* Writes all of `to`. tolerance: of each state, in its unit. */
     void (*measure)(const void *values, double t, const double tolerance[],
                     const struct contacts_measured *to);
+    /* Writes the limits of all contacts, two of each, as `compare` of struct relations does. */
+    void (*compare)(const void *values, double t, const struct given *given,
+                    struct compared *compared);
 };
 
 /* Memory for one call. */
