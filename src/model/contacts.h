@@ -12,6 +12,9 @@
 
 #include "model.h"
 
+struct given;
+struct compared;
+
 enum { CONTACTS_MOST_COUPLED = 8 };
 
 /* Modes of friction and of stops. */
@@ -22,9 +25,9 @@ struct contact {
     const char *name;
     bool is_friction, has_lower, has_upper;
     int direction;
-    int count;            /* of the model that is its mode */
-    size_t position;      /* of stops: state that is set where one is reached */
-    size_t impulse, loss; /* of stops: offsets of these in the values */
+    int count;                      /* of the model that is its mode */
+    size_t position;                /* of stops: state that is set where one is reached */
+    size_t impulse, impulses, loss; /* of stops: offsets of these in the values */
 };
 
 struct direction {
@@ -61,6 +64,9 @@ struct contacts {
     /* Writes all of `to`. tolerance: of each state, in its unit. */
     void (*measure)(const void *values, double t, const double tolerance[],
                     const struct contacts_measured *to);
+    /* Writes the limits of all contacts, two of each, as `compare` of struct relations does. */
+    void (*compare)(const void *values, double t, const struct given *given,
+                    struct compared *compared);
 };
 
 /* Memory for one call. */

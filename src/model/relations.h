@@ -89,7 +89,7 @@ struct relations {
     const char *const *every_names;  /* of the period of each sampler */
     const struct assignment *assignment;
     int assignment_count;
-    const struct contacts *contacts; /* NULL: none; `compare` writes their limits behind relations */
+    const struct contacts *contacts; /* NULL: none */
 
     /* Writes the start values of modes, and of states and discrete variables that follow from
      * parameters. NULL if there are none. */
@@ -115,16 +115,17 @@ struct relations {
 
 /* Memory for one call. */
 struct relations_room {
-    struct compared *compared, *before; /* one per relation and two per contact each */
-    double *times;                      /* one per relation */
-    double *every, *offset;             /* one per sampler */
-    int *segment;                       /* one per segment */
-    int *due;                           /* one per event */
-    int *turned;                        /* one per relation; zeros */
-    double *tolerance;                  /* one per state */
-    double *assigned;                   /* one per assignment */
-    int *counted;                       /* one per count */
-    const double *zeros;                /* one per state and input */
+    struct compared *compared; /* one per relation and two per contact */
+    struct compared *before;   /* one per relation */
+    double *times;             /* one per relation */
+    double *every, *offset;    /* one per sampler */
+    int *segment;              /* one per segment */
+    int *due;                  /* one per event */
+    int *turned;               /* one per relation; zeros */
+    double *tolerance;         /* one per state */
+    double *assigned;          /* one per assignment */
+    int *counted;              /* one per count */
+    const double *zeros;       /* one per state and input */
     struct contacts_room contacts;
 };
 

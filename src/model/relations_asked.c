@@ -41,10 +41,13 @@ void relations_errors(const struct relations *model, struct relations_room room,
             errors[model->relation[k].indicator] = isfinite(noise) ? noise : 0.0;
         }
     }
-    const struct compared *limit = room.compared + model->relation_count;
-    for (int i = 0; model->contacts != NULL && i < 2 * model->contacts->contact_count; i++) {
-        errors[model->contacts->indicator + (size_t)i] =
-            isfinite(limit[i].noise) ? limit[i].noise : 0.0;
+    if (model->contacts == NULL) {
+        return;
+    }
+    model->contacts->compare(values, t, &given, room.compared);
+    for (int i = 0; i < 2 * model->contacts->contact_count; i++) {
+        const double noise = room.compared[i].noise;
+        errors[model->contacts->indicator + (size_t)i] = isfinite(noise) ? noise : 0.0;
     }
 }
 

@@ -15,18 +15,27 @@ struct call modes_call(const struct relations *model, struct relations_room room
         t,     0.0,  t,      du,    largest_inputs};
 }
 
-static void compare_in(const struct call *call, bool is_free, const double state_errors[],
-                       struct compared compared[]) {
+static struct given given_in(const struct call *call, bool is_free, const double state_errors[]) {
     const bool inputs_move = call->largest_inputs != NULL; // those that do not are exact
     const double *largest = inputs_move ? call->largest_inputs : call->room.zeros;
     const double inputs = inputs_move ? MODES_TIME_ERROR : 0.0;
-    const struct given given = {state_errors, call->error, inputs, largest, call->du, is_free};
+    return (struct given){state_errors, call->error, inputs, largest, call->du, is_free};
+}
+
+static void compare_in(const struct call *call, bool is_free, const double state_errors[],
+                       struct compared compared[]) {
+    const struct given given = given_in(call, is_free, state_errors);
     call->model->compare(call->values, call->t, &given, compared);
 }
 
 void modes_compare(const struct call *call, const double state_errors[],
                    struct compared compared[]) {
     compare_in(call, false, state_errors, compared);
+}
+
+void modes_compare_limits(const struct call *call, struct compared compared[]) {
+    const struct given given = given_in(call, false, call->room.tolerance);
+    call->model->contacts->compare(call->values, call->t, &given, compared);
 }
 
 /* True if the distance follows from a solution that is not known: it tells nothing. */

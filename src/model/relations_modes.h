@@ -59,6 +59,9 @@ struct call modes_call(const struct relations *model, struct relations_room room
 void modes_compare(const struct call *call, const double state_errors[],
                    struct compared compared[]);
 
+/* Compares the limits of all contacts, two of each. */
+void modes_compare_limits(const struct call *call, struct compared compared[]);
+
 /* Updates all modes at an event. Where one value jumps, others may come to their limits. */
 void modes_settle(const struct call *call);
 

@@ -287,9 +287,7 @@ def second(graph: Graph, y: Value, firsts, d: Sequence[Value], dd: Sequence[Valu
         factors = y.arguments[0]
         right = _minus_product(graph, dd[1:], dd[0], y)
         if d[0].op != "number" and first.op != "number":
-            of_slopes = _minus_product(
-                graph, [graph.number(0.0)] * len(right), factors, d[0], first
-            )
+            of_slopes = _minus_product(graph, [graph.number(0.0)] * len(right), d[0], first)
             right = [
                 graph.simple("+", b, graph.simple("*", two, rest))
                 for b, rest in zip(right, of_slopes, strict=True)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from . import algebraic
 from .algebraic import replaced
+from .held import Held
 from .samples import are_equal, exact
 
 if TYPE_CHECKING:
@@ -107,6 +108,8 @@ class Builder:
         self.zero, self.one = graph.number(0.0), graph.number(1.0)
         self.forces = {(c.force.op, c.force.name): c for c in contacts}
         self.directions: list[Direction] = []
+        self.moved: dict[Value, list[Value]] = {}  # states, with the response of their rates
+        self.own_rates: dict[Value, Value] = {}  # of states, where they are found with forces
 
     # ---- Directions ------------------------------------------------------------------------------
 
@@ -245,7 +248,7 @@ class Builder:
         for x, factor in row.items():
             if x is not own:
                 total = self._plus(total, self._times(factor, x))
-        return self._over(self.graph.negative(total), row[own])
+        return self.over(self.graph.negative(total), row[own])
 
     def _find_place(self, contact: Contact, row: dict[Value, Value], rest: Value) -> None:
         """Find the state that is set where a stop is reached."""
@@ -273,6 +276,13 @@ class Builder:
         """Return whether stops are closed."""
         return self.graph.value("not", self._is(contact, FREE))
 
+    def alone(self, direction: Direction, contact: Contact) -> Value:
+        """Return whether stops hold a direction without friction."""
+        closed, stuck = self.closed(contact), self.stuck(direction)
+        return closed if stuck is None else self.graph.value(
+            "and", closed, self.graph.value("not", stuck)
+        )  # fmt: skip
+
     def _held(self, direction: Direction) -> Value:
         stuck = self.stuck(direction)
         found = [] if stuck is None else [stuck]
@@ -281,7 +291,9 @@ class Builder:
 
     def sliding(self, contact: Contact) -> Value:
         """Return friction of what slides, against its velocity: with its sign."""
-        return self._if(self._is(contact, BACKWARD), self.graph.negative(contact.law), contact.law)
+        return self.choice(
+            self._is(contact, BACKWARD), self.graph.negative(contact.law), contact.law
+        )
 
     def _law(self, contact: Contact) -> Value:
         """Return the size of sliding friction: c + (b - c) exp(-(v / v_s)^2)."""
@@ -293,12 +305,12 @@ class Builder:
             e = graph.value("exp", graph.value("negative", graph.value("*", w, w)))
             at_rest = graph.value("*", given["breakaway"], e)
             slides = graph.value("*", given["coulomb"], graph.value("-", self.one, e))
-            size = self._if(
+            size = self.choice(
                 graph.value(">", given["stribeck"], self.zero),
                 graph.value("+", at_rest, slides),
                 given["coulomb"],
             )
-        return size if contact.active is None else self._if(contact.active, size, self.zero)
+        return size if contact.active is None else self.choice(contact.active, size, self.zero)
 
     def build(self) -> tuple[Contacts, dict[Value, Value], dict[Value, Value], dict[Value, Value]]:
         """Return the contacts, forces in rates, forces that are shown, and rates of the states.
@@ -341,6 +353,7 @@ class Builder:
                     text = f"{contact.force.name} does not act on the velocity"
                     raise ContactError(contact, "force", text)
         blocks = self._blocks(response)
+        self.moved = moved
         found = Contacts(self.contacts, self.directions, [], accelerations, response, moved, blocks)
         self._solve(found, plain)
         in_rates, shown = self._forces(found)
@@ -376,11 +389,11 @@ class Builder:
             own = row[self.contacts.index(contact)]
             if contact.is_friction:
                 own = self.graph.negative(own)
-                own = own if not direction.stops else self._if(self.stuck(direction), own, value)
+                own = own if not direction.stops else self.choice(self.stuck(direction), own, value)
             else:
-                own = self._over(own, contact.ratio)
+                own = self.over(own, contact.ratio)
                 is_last = contact is direction.contacts[-1]
-                own = own if is_last else self._if(self.closed(contact), own, value)
+                own = own if is_last else self.choice(self.closed(contact), own, value)
             value = own
         return value
 
@@ -392,19 +405,25 @@ class Builder:
             own = self.zero
             if contact.is_friction:
                 slides = self.sliding(contact)
-                own = self._if(self._is(contact, STUCK), self.zero, slides)
+                own = self.choice(self._is(contact, STUCK), self.zero, slides)
             sliding[contact.force] = own
         pushed = replaced(graph, accelerations, sliding)
         for block in found.blocks:
+            if Held.fits([self.directions[k] for k in block]):
+                held = Held(self, block, found.response)
+                for k in block:
+                    self.directions[k].hold = held.hold(k)
+                    self.own_rates[self.directions[k].own] = held.rate(k)
+                continue
             right = [
-                self._if(self.directions[k].held, graph.negative(pushed[k]), self.zero)
+                self.choice(self.directions[k].held, graph.negative(pushed[k]), self.zero)
                 for k in block
             ]
             if len(block) == 1:
                 (k,) = block
                 column = self._column(self.directions[k], found.response[k])
-                hold = self._over(graph.negative(pushed[k]), column)
-                self.directions[k].hold = self._if(self.directions[k].held, hold, self.zero)
+                hold = self.over(graph.negative(pushed[k]), column)
+                self.directions[k].hold = self.choice(self.directions[k].held, hold, self.zero)
                 continue
             elements = {}
             for i, k in enumerate(block):
@@ -412,7 +431,7 @@ class Builder:
                     column = self._column(self.directions[other], found.response[k])
                     if i == j or not _is_zero(column):
                         diagonal = self.one if i == j else self.zero
-                        elements[i, j] = self._if(self.directions[k].held, column, diagonal)
+                        elements[i, j] = self.choice(self.directions[k].held, column, diagonal)
             vector = graph.value("linear", algebraic.matrix(graph, elements), *right)
             names = [c.force.name for k in block for c in self.directions[k].contacts]
             texts = [f"0 = der({self.directions[k].contacts[0].name}.velocity)" for k in block]
@@ -427,24 +446,21 @@ class Builder:
             friction, stuck, hold = direction.friction, self.stuck(direction), direction.hold
             if friction is not None:
                 slides = self.sliding(friction)
-                in_rates[friction.force] = self._if(stuck, graph.negative(hold), slides)
+                in_rates[friction.force] = self.choice(stuck, graph.negative(hold), slides)
                 shown[friction.force] = in_rates[friction.force]
             for contact in direction.stops:
-                force = self._over(hold, contact.ratio)
-                alone = self.closed(contact)
-                if stuck is not None:
-                    alone = graph.value("and", alone, graph.value("not", stuck))
-                in_rates[contact.force] = self._if(alone, force, self.zero)
+                force, alone = self.over(hold, contact.ratio), self.alone(direction, contact)
+                in_rates[contact.force] = self.choice(alone, force, self.zero)
                 shown[contact.force] = in_rates[contact.force]
                 if friction is None:
                     continue
                 excess = self._excess(friction, contact, hold)
                 both = graph.value("and", stuck, self.closed(contact))
-                shown[contact.force] = self._if(
-                    both, self._over(excess, contact.ratio), in_rates[contact.force]
+                shown[contact.force] = self.choice(
+                    both, self.over(excess, contact.ratio), in_rates[contact.force]
                 )
                 rest = graph.value("-", excess, hold)
-                shown[friction.force] = self._if(both, rest, shown[friction.force])
+                shown[friction.force] = self.choice(both, rest, shown[friction.force])
         return in_rates, shown
 
     def is_positive(self, contact: Contact) -> Value:
@@ -470,13 +486,14 @@ class Builder:
         below = graph.value(
             "if", graph.value("<", hold, lower), graph.value("-", hold, lower), self.zero
         )
-        return self._if(self.is_positive(contact), above, below)
+        return self.choice(self.is_positive(contact), above, below)
 
     def _rates(self, forces: Mapping[Value, Value]) -> dict[Value, Value]:
         """Return the rates of the states: of what is held, one follows from the others."""
         rates = [*self.rates.values()]
-        found = dict(zip(self.rates, replaced(self.graph, rates, forces), strict=True))
-        done: set[Value] = set()
+        by = {**forces, **{self.rates[x]: rate for x, rate in self.own_rates.items()}}
+        found = dict(zip(self.rates, replaced(self.graph, rates, by), strict=True))
+        done = {*self.own_rates}
         owners = {direction.own: direction for direction in self.directions}
 
         def finish(x: Value, above: tuple[Value, ...]) -> Value | None:
@@ -493,8 +510,8 @@ class Builder:
                     if rate is None:
                         return None
                     total = self._plus(total, self._times(factor, rate))
-            at_rest = self._over(self.graph.negative(total), direction.row[x])
-            found[x] = self._if(direction.held, at_rest, found[x])
+            at_rest = self.over(self.graph.negative(total), direction.row[x])
+            found[x] = self.choice(direction.held, at_rest, found[x])
             done.add(x)
             return found[x]
 
@@ -537,7 +554,7 @@ class Builder:
     ) -> list[Limit]:
         graph, limit, stuck = self.graph, self.breakaway(contact), self._is(contact, STUCK)
         velocity = contact.given["velocity"]
-        moves = self._if(self._is(contact, BACKWARD), graph.negative(velocity), velocity)
+        moves = self.choice(self._is(contact, BACKWARD), graph.negative(velocity), velocity)
         used, opens = [contact.active, stuck], []
         for stop in direction.stops:
             positive, is_open = self.is_positive(stop), self._is(stop, FREE)
@@ -566,7 +583,7 @@ class Builder:
 
     # ---- Operations ------------------------------------------------------------------------------
 
-    def _if(self, condition: Value, first: Value, second: Value) -> Value:
+    def choice(self, condition: Value, first: Value, second: Value) -> Value:
         return first if first is second else self.graph.value("if", condition, first, second)
 
     def _plus(self, a: Value, b: Value) -> Value:
@@ -580,7 +597,7 @@ class Builder:
             return self.graph.negative(b)
         return self.graph.simple("*", a, b)
 
-    def _over(self, a: Value, b: Value) -> Value:
+    def over(self, a: Value, b: Value) -> Value:
         if b.op == "number" and b.number == -1.0:
             return self.graph.negative(a)
         return self.graph.simple("/", a, b)

@@ -95,7 +95,11 @@ def _declare(file: ModelFile, section: str, name: str, force: str) -> None:
     )
     own.append(of_force)
     if section == STOPS:
-        texts = {"impulse": "Impulse of the last impact", "loss": "Energy lost in all impacts"}
+        texts = {
+            "impulse": "Impulse of the last impact",
+            "impulses": "Sum of the impulses of all impacts",
+            "loss": "Energy lost in all impacts",
+        }
         own += [
             Variable(variable_of(name, key), "discrete", start=0.0, description=f"{text} of {name}")
             for key, text in texts.items()
@@ -128,7 +132,8 @@ def add_units(file: ModelFile, units: dict[str, Dimension | None]) -> dict[str, 
         expected |= {e: found[key] for key, e in contact.given.items() if key in found}
         own = {contact.force: force, contact.variable("force"): force}
         if not contact.is_friction:
-            own |= {contact.variable("impulse"): times(force, second)}
+            impulse = times(force, second)
+            own |= {contact.variable("impulse"): impulse, contact.variable("impulses"): impulse}
             own |= {contact.variable("loss"): times(POWER, second)}
         for name, dimension in own.items():
             units[name] = dimension

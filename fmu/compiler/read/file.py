@@ -277,7 +277,8 @@ def _read_variable(file: ModelFile, section: str, element: Element) -> None:
 def _keys(section: str, entry: object, file: ModelFile) -> tuple[tuple[str, ...], str]:
     """Return the keys that an entry may have, and the one that it needs."""
     if section in header.CALCULATED and file.calculate:  # C may write it
-        return keys.SECTIONS[section][0], ""
+        is_typed = isinstance(entry, dict) and "type" in entry
+        return (keys.OWN_KEYS if is_typed else keys.SECTIONS)[section][0], ""
     known, needed = keys.SECTIONS[section]
     if section == "parameters" and isinstance(entry, dict) and "value" in entry:
         known, needed = keys.FOLLOWING_COUNTS if "type" in entry else keys.OWN_KEYS[FOLLOWS]

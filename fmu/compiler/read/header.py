@@ -2,8 +2,8 @@
 
 It is made of NAME.toml beside it. struct NAME_parameters has the parameters, with those of an
 included file OTHER.toml in a struct OTHER_parameters; struct NAME_values has the time and all
-variables. Elements of an array have their places in an array of C, from 0. What is neither real
-nor a condition has an enum.
+variables, with the forces of friction and stops. Elements of an array have their places in an array
+of C, from 0. What is neither real nor a condition has an enum.
 """
 
 import os
@@ -23,6 +23,7 @@ from .keys import FIELD
 
 GROUPS = {"inputs": "inputs", "states": "states", "discrete": "held between events"}
 CALCULATED = ("where", "outputs")  # those without a value are written by C
+CONTACTS = ("friction", "stops")  # their forces are read by C
 RATES = "dx"  # of a file with a hook
 Place = tuple[str | int, ...]  # a field of struct NAME_values, from its name
 
@@ -126,6 +127,8 @@ class Header:
             boolean = {"type": BOOLEAN}
             names = [(name, boolean) for name in modes if isinstance(name, str)]
             self.variables["modes"] = fields_of(names, self.stem)
+        forces = [(name, None) for name in _forces(file, tables)]
+        self.variables["forces of friction and stops"] = fields_of(forces, self.stem)
         self.variables["calculated"] = fields(*CALCULATED, only_called=not has_hook)
         states = sum(len(field.elements) for field in self.variables["states"])
         self.rates = [f"double {RATES}[{states}]; /* derivatives of the states */"]
@@ -187,6 +190,16 @@ class Header:
     def has_parameters(self) -> bool:
         """Whether there is a struct of parameters."""
         return bool(self.own) or any(header.has_parameters for header in self.inner)
+
+
+def _forces(file: ModelFile, tables: dict[str, Any]) -> Iterator[str]:
+    """Yield the names of the forces of friction and stops."""
+    for section in CONTACTS:
+        given = tables.get(section)
+        for key, entry in given.items() if isinstance(given, dict) else ():
+            with suppress(Exception):  # what is wrong with it is said where it is read
+                for each in elements(file, key, entry):
+                    yield file.expression(each, (), each.entry["force"], None).tree.name
 
 
 def _indexes(name: str) -> tuple[int, ...]:

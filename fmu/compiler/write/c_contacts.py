@@ -16,6 +16,12 @@ def limits(file: ModelFile) -> list[Limit]:
     return file.graph.contacts.limits if file.graph.contacts else []
 
 
+def held_states(file: ModelFile) -> dict[Value, Value]:
+    """Return states that are 0 while a direction is held, with that condition."""
+    found = file.graph.contacts.directions if file.graph.contacts else []
+    return {d.own: d.held for d in found if d.velocity is d.own}
+
+
 def distance(file: ModelFile, limit: Limit) -> Value:
     """Return the distance of a limit in the modes that are."""
     graph = file.graph
@@ -48,7 +54,7 @@ def compare(
     file: ModelFile, code: Code, errors: Errors, slopes: Sequence[Value]
 ) -> list[Statement]:
     """Return statements that compare the limits; slopes: their derivatives by the time."""
-    stores, first = [], len(file.graph.relations)
+    stores = []
     for i, (limit, slope) in enumerate(zip(limits(file), slopes, strict=True)):
         found = distance(file, limit)
         entries = {
@@ -58,12 +64,12 @@ def compare(
             "used": "1" if limit.used is None else code.of(limit.used),
         }
         for key, of in entries.items():
-            stores.append(store(Place("compared[", first + i, f"].{key}"), of))
+            stores.append(store(Place("compared[", i, f"].{key}"), of))
     return stores
 
 
-def parts(file: ModelFile, leaves: Leaves) -> dict[str, object]:
-    """Return what events.c.in has of contacts."""
+def parts(file: ModelFile, leaves: Leaves, compared: list[str]) -> dict[str, object]:
+    """Return what events.c.in has of contacts; compared: lines that compare their limits."""
     found = file.graph.contacts
     if found is None:
         return {"contacts": [], "of_contacts": [], "limits": 0, "room_of_contacts": ", {0}"}
@@ -75,6 +81,7 @@ def parts(file: ModelFile, leaves: Leaves) -> dict[str, object]:
         direction=[_direction_row(file, direction, states) for direction in found.directions],
         moved=", ".join(str(states[x]) for x in found.moved) or "0",
         measure=_measure(file, leaves),
+        compare=compared,
         contacts=counts[1],
         directions=counts[0],
         blocks=len(found.blocks),
@@ -105,9 +112,9 @@ def _contact_row(file: ModelFile, contact: Contact, states: dict[Value, int]) ->
         str(numbers[variable_of(contact.name, "mode")]),
     ]
     if contact.is_friction:
-        return f"{{{', '.join([*own, '0', '0', '0'])}}},"
+        return f"{{{', '.join([*own, '0', '0', '0', '0'])}}},"
     own.append(str(states[contact.place[0]]))
-    for key in ("impulse", "loss"):
+    for key in ("impulse", "impulses", "loss"):
         field = file.fields.value(variable_of(contact.name, key))
         own.append(f"offsetof(struct equations_values, {field})")
     return f"{{{', '.join(own)}}},"

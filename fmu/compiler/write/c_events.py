@@ -294,7 +294,7 @@ class Events:
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located) + len(self.limits),
             are_possible=self._are_possible(),
-            **c_contacts.parts(file, self.leaves),
+            **c_contacts.parts(file, self.leaves, self._compare_limits()),
             next_time=NEXT_TIME if timed or file.sampled else [],
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
@@ -370,17 +370,21 @@ class Events:
     def _rest(self) -> dict[str, list[str]]:
         """When all states rest: where the conditions hold that make each rate 0.
 
-        Then nothing is integrated, and no event is located that the time or inputs lead to.
+        Then nothing is integrated, and no event is located that the time leads to.
         """
         conditions, zero = [], self.graph.number(0.0)
+        held = c_contacts.held_states(self.file)
         for state in self.file.of("states"):
             rate = state.value
             if rate.op == "if" and rate.arguments[1] is zero and not rate.arguments[0].moves:
                 conditions.append(rate.arguments[0])
+            elif rate in held:
+                conditions.append(held[rate])
             elif rate is not zero:
                 conditions = []
                 break
-        if not conditions or self.located or self.limits:
+        is_of_time = any(("time", "") in distance.leaves for distance in self.followed)
+        if not conditions or (self.located and not self.limits) or is_of_time:
             return {"rest": [], "is_at_rest": []}
         code = Code(self.leaves)
         rests = code.of(reduce(partial(self.graph.value, "and"), dict.fromkeys(conditions)))
@@ -390,7 +394,8 @@ class Events:
         rest = [*head, *indented(code.lines()), "}", ""]
         return {"rest": rest, "is_at_rest": [".is_at_rest = is_at_rest,"]}
 
-    def _compare(self) -> list[str]:
+    def _comparing(self) -> tuple[Code, Errors, dict[Value, Value]]:
+        """Return code that compares, errors of its values, and what moves with its rates."""
         graph, states, inputs = self.graph, self.file.of("states"), self.file.of("inputs")
         moving = {("first", v.name): Place("given->du[", i, "]") for i, v in enumerate(inputs)}
         code = Code(self.leaves.but(moving, is_free="given->is_free"))
@@ -405,19 +410,26 @@ class Events:
             size = "fmax", ("fabs", value), Place("given->largest[", i, "]")
             of_value, of_time = ("*", "given->inputs", size), ("*", "given->time", ("fabs", rate))
             given["input", u.name] = "+", of_value, of_time
-        errors = Errors(graph, code, given)
+        return code, Errors(graph, code, given), motion
+
+    def _compare(self) -> list[str]:
+        code, errors, motion = self._comparing()
         stores = []
         for k, relation in enumerate(self.relations):
             distance, used = relation.distance, self.used[relation.name]
             error = errors.of(distance) if relation.time is None else NONE
-            (slope,) = graph.derivatives([distance], motion)
+            (slope,) = self.graph.derivatives([distance], motion)
             found = {"distance": code.of(distance), "slope": code.of(slope), "noise": error}
             found["used"] = "1" if used is None else code.of(used)
             stores += [store(Place("compared[", k, f"].{key}"), of) for key, of in found.items()]
-        distances = [c_contacts.distance(self.file, limit) for limit in self.limits]
-        slopes = graph.derivatives(distances, motion)
-        stores += c_contacts.compare(self.file, code, errors, slopes)
         code.statements += stores
+        return code.lines()
+
+    def _compare_limits(self) -> list[str]:
+        code, errors, motion = self._comparing()
+        distances = [c_contacts.distance(self.file, limit) for limit in self.limits]
+        slopes = self.graph.derivatives(distances, motion)
+        code.statements += c_contacts.compare(self.file, code, errors, slopes)
         return code.lines()
 
     def _due(self) -> list[str]:
@@ -545,12 +557,13 @@ class Events:
         return code.lines()
 
     def _are_possible(self) -> list[str]:
-        """Whether there are relations, or contacts that may hold."""
-        active = [contact.active for contact in self.graph.contacts.contacts] if self.limits else []
-        if self.located or not active or None in active:
-            return [f"return {str(bool(self.located or active)).lower()};"]
+        """Whether there are relations that are read in these modes, or contacts that may hold."""
+        used = [contact.active for contact in self.graph.contacts.contacts] if self.limits else []
+        used += [self.used[relation.name] for relation in self.located]
+        if not used or any(x is None or x.moves for x in used):
+            return [f"return {str(bool(used)).lower()};"]
         code = Code(self.leaves)
-        holds = code.of(reduce(partial(self.graph.value, "or"), dict.fromkeys(active)))
+        holds = code.of(reduce(partial(self.graph.value, "or"), dict.fromkeys(used)))
         code.statements.append(Statement(("return ", ("!=", holds, 0), ";")))
         head = "const struct equations_values *values = values_pointer;"
         return [head, *code.lines()]
