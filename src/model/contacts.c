@@ -30,8 +30,8 @@ struct work {
 static struct contacts_measured measured_in(const struct contacts *model, double *room) {
     const int directions = model->direction_count, contacts = model->contact_count;
     struct contacts_measured to;
-    double **const of_directions[] = {&to.velocity, &to.size, &to.rest, &to.factor,
-                                      &to.acceleration};
+    double **const of_directions[] = {&to.velocity, &to.size,   &to.slack,
+                                      &to.rest,     &to.factor, &to.acceleration};
     double **const of_contacts[] = {
         &to.active,   &to.ratio,       &to.law,       &to.coulomb, &to.breakaway,
         &to.stribeck, &to.position,    &to.lower,     &to.upper,   &to.at_lower,
@@ -260,7 +260,7 @@ static void find_rest(struct work *work) {
         const bool has_halted = friction >= 0 && work->hit[friction] != 0;
         const bool may_rest = friction >= 0 || work->sense[k] != 0;
         const double most = is_held(work, k) && !work->model->direction[k].is_plain
-                                ? drift * work->now.size[k]
+                                ? drift * work->now.size[k] + work->now.slack[k]
                                 : least_velocity(work, k);
         work->rests[k] = may_rest && (has_halted || speed <= most);
         if (has_halted) {

@@ -40,6 +40,7 @@ struct direction {
 struct contacts_measured {
     double *velocity;
     double *size;         /* sum of the magnitudes of the velocity's terms */
+    double *slack;        /* likewise of the tolerances of their states */
     double *rest;         /* value of the own state at which the velocity is 0 */
     double *factor;       /* of the own state in the velocity */
     double *acceleration; /* without forces of contacts */
@@ -77,7 +78,7 @@ struct contacts_room {
 };
 
 #define CONTACTS_MEASURED(directions, contacts, moved)                                             \
-    (5 * (directions) + (directions) * (contacts) + (moved) * (contacts) + 13 * (contacts))
+    (6 * (directions) + (directions) * (contacts) + (moved) * (contacts) + 13 * (contacts))
 
 #define CONTACTS_ROOM(directions, contacts, moved)                                                 \
     (struct contacts_room) {                                                                       \

@@ -1,6 +1,6 @@
 """Dry friction and stops in C (src/model/contacts.h): tables, limits and what decides them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..graph.contacts import Contact, Direction, Limit
 from ..graph.graph import Value
@@ -157,13 +157,12 @@ def _measure(file: ModelFile, leaves: Leaves) -> list[str]:
         if direction.offset.leaves:
             terms.append(("fabs", code.of(direction.offset)))
         sums.append(store(Place("to->size[", k, "]"), _sum(terms)))
+        slack = _tolerance(code, direction.row, states)
+        sums.append(store(Place("to->slack[", k, "]"), slack))
     for e, contact in enumerate(found.contacts):
-        terms = [
-            ("*", ("fabs", code.of(factor)), Place("tolerance[", states[x], "]"))
-            for x, factor in contact.tolerances.items()
-        ]
-        if terms:
-            sums.append(store(Place("to->tolerance[", e, "]"), _sum(terms)))
+        if contact.tolerances:
+            most = _tolerance(code, contact.tolerances, states)
+            sums.append(store(Place("to->tolerance[", e, "]"), most))
         active = contact.active if contact.active is not None else None
         is_active = "1.0" if active is None else ("if", code.of(active), 1.0, 0.0)
         sums.append(store(Place("to->active[", e, "]"), is_active))
@@ -188,6 +187,16 @@ def _of_contact(file: ModelFile, contact: Contact) -> dict[str, Value]:
             limit = given[key] if is_plain else graph.value("/", given[key], factor)
             own[f"at_{key}"] = graph.simple("+", limit, rest)
     return own
+
+
+def _tolerance(code: Code, row: Mapping[Value, Value], states: Mapping[Value, int]) -> Operand:
+    """Return the tolerance of a linear value, from those of its states."""
+    return _sum(
+        [
+            ("*", ("fabs", code.of(factor)), Place("tolerance[", states[x], "]"))
+            for x, factor in row.items()
+        ]
+    )
 
 
 def _sum(terms: Sequence[Operand]) -> Operand:
