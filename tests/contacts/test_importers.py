@@ -42,7 +42,9 @@ def test_snapshots_and_event_mode_change_nothing(unit: Callable, name: str) -> N
     """In FMI 2.0 within steps; in FMI 3.0 steps end at events: the same motion."""
     step, count, runs = (STOPS | TIMED)[name] / COUNT, COUNT, {}
     for method in ("cvode_adams", "cvode_bdf", "erk", "taylor"):
-        within = co_simulation(unit(name), method, 1e-10, step, count, {}, step * np.array([1, 9, 21, 36]))
+        within = co_simulation(
+            unit(name), method, 1e-10, step, count, {}, step * np.array([1, 9, 21, 36])
+        )
         ending = early_return(unit(name), method, 1e-10, step, count, snapshots=True)
         assert within.differences == ending.differences == []
         assert within.counts[-1] == ending.counts[-1] > 0

@@ -144,7 +144,7 @@ class Builder:
             return found
         if limit.op == "number" and limit.number > 0:
             return found
-        exists = self.graph.value(">", limit, self.zero)
+        exists = self.graph.value("not", self.graph.value("==", limit, self.zero))
         return exists if found is None else self.graph.value("and", found, exists)
 
     def breakaway(self, contact: Contact) -> Value | None:
