@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 BACKWARD, STUCK, FORWARD = 1, 2, 3  # modes of friction
 FREE, LOWER, UPPER = 1, 2, 3  # modes of stops
+REACHED = "reached"  # name of a function that steps cannot hide: reach of struct model_events
 MOST_COUPLED = 8  # src/model/contacts.h
 STILL = ("parameter", "integer", "mode", "discrete")  # leaves of factors
 OF_OFFSETS = (*STILL, "time")
@@ -267,7 +268,7 @@ class Builder:
             size = given["coulomb"]
         else:
             w = graph.value("/", given["velocity"], given["stribeck"])
-            e = graph.value("exp", graph.value("negative", graph.value("*", w, w)))
+            e = graph.value("exp", graph.value("negative", graph.value("*", w, w)), name=REACHED)
             at_rest = graph.value("*", given["breakaway"], e)
             slides = graph.value("*", given["coulomb"], graph.value("-", self.one, e))
             size = self.choice(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from .algebraic import UNKNOWN, replaced
 
 if TYPE_CHECKING:
-    from .contacts import Builder, Contact, Direction
+    from .contacts import Builder, Direction
     from .graph import Value
 
 MOST_DIRECTIONS = 3  # of a block: it has as many cases as there are sets of them

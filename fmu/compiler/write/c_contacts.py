@@ -1,9 +1,11 @@
-"""Dry friction and stops in C (src/model/contacts.h): their tables, limits and what decides them."""
+"""Dry friction and stops in C (src/model/contacts.h): tables, limits and what decides them."""
 
 from collections.abc import Sequence
+from functools import partial, reduce
+from itertools import pairwise
 
-from ..graph.contacts import Contact, Direction, Limit
-from ..graph.graph import Value
+from ..graph.contacts import BACKWARD, FORWARD, FREE, Contact, Direction, Limit
+from ..graph.graph import Graph, Value
 from ..read.content import ModelFile
 from .c_code import Code, Leaves
 from .c_text import filled, text
@@ -20,6 +22,53 @@ def held_states(file: ModelFile) -> dict[Value, Value]:
     """Return states that are 0 while a direction is held, with that condition."""
     found = file.graph.contacts.directions if file.graph.contacts else []
     return {d.own: d.held for d in found if d.velocity is d.own}
+
+
+def moves_on(file: ModelFile) -> Value | None:
+    """Return a condition for contacts to stay as they are; None: there is none.
+
+    Each moves, with valid values, or is off.
+    """
+    if file.graph.contacts is None:
+        return None
+    graph, found = file.graph, []
+    zero, one = graph.number(0.0), graph.number(1.0)
+    both, either = partial(graph.value, "and"), partial(graph.value, "or")
+    for direction in file.graph.contacts.directions:
+        if not _is_plain(direction):
+            return None
+        for contact in direction.contacts:
+            given, is_in = contact.given, partial(is_mode, graph, contact)
+            if contact.is_friction:
+                velocity, coulomb = given["velocity"], given["coulomb"]
+                forward = both(is_in(FORWARD), graph.value(">", velocity, zero))
+                backward = both(is_in(BACKWARD), graph.value("<", velocity, zero))
+                valid = graph.value(">=", coulomb, zero)
+                if "breakaway" in given:
+                    falls = graph.value(">", given["breakaway"], coulomb)
+                    falls = both(falls, graph.value(">", given["stribeck"], zero))
+                    valid = both(
+                        valid, either(falls, graph.value("==", given["breakaway"], coulomb))
+                    )
+                own, off = both(either(forward, backward), valid), is_in(FORWARD)
+            else:
+                ends = [given[key] for key in ("lower", "position", "upper") if key in given]
+                inside = [graph.value("<", a, b) for a, b in pairwise(ends)]
+                inside.append(graph.value(">=", given["restitution"], zero))
+                inside.append(graph.value("<=", given["restitution"], one))
+                off = is_in(FREE)
+                own = reduce(both, inside, off)
+            if contact.active is not None:
+                own = either(
+                    both(contact.active, own), both(graph.value("not", contact.active), off)
+                )
+            found.append(own)
+    return reduce(both, found)
+
+
+def is_mode(graph: Graph, contact: Contact, mode: int) -> Value:
+    """Return whether a contact is in a mode."""
+    return graph.value("==", contact.mode, graph.number(float(mode)))
 
 
 def distance(file: ModelFile, limit: Limit) -> Value:
@@ -123,14 +172,19 @@ def _contact_row(file: ModelFile, contact: Contact, states: dict[Value, int]) ->
 def _direction_row(file: ModelFile, direction: Direction, states: dict[Value, int]) -> str:
     blocks, number = file.graph.contacts.blocks, file.graph.contacts.directions.index(direction)
     block = next(i for i, block in enumerate(blocks) if number in block)
-    is_plain = len(direction.row) == 1 and not direction.rest.leaves
-    return f"{{{states[direction.own]}, {str(is_plain).lower()}, {block}}},"
+    is_plain = str(_is_plain(direction)).lower()
+    return f"{{{states[direction.own]}, {is_plain}, {block}}},"
+
+
+def _is_plain(direction: Direction) -> bool:
+    """Return whether a velocity is a multiple of a state."""
+    return len(direction.row) == 1 and not direction.rest.leaves
 
 
 def _measure(file: ModelFile, leaves: Leaves) -> list[str]:
-    found, graph, code = file.graph.contacts, file.graph, Code(leaves)
+    found, code = file.graph.contacts, Code(leaves)
     states = {x.leaf: i for i, x in enumerate(file.of("states"))}
-    count, zero = len(found.contacts), graph.number(0.0)
+    count = len(found.contacts)
     values: dict[Place, Value | Operand] = {}
     sums: list[Statement] = []
     for k, direction in enumerate(found.directions):

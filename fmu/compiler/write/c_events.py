@@ -9,7 +9,6 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial, reduce
 
 from ..expressions.expression import in_order
 from ..expressions.kinds import CONDITION, WHOLE, Kind
@@ -18,7 +17,7 @@ from ..names import Field, c_name
 from ..plain_c.values import Conditions
 from ..read.content import CALCULATED, COUNTS, SWITCHES, Change, ModelFile, Sampler
 from ..units import Exponents
-from . import c_contacts, c_undefined
+from . import c_contacts, c_possible, c_undefined
 from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
@@ -293,13 +292,12 @@ class Events:
             switches=self._switches(),
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located) + len(self.limits),
-            are_possible=self._are_possible(),
             **c_contacts.parts(file, self.leaves, self._compare_limits()),
             next_time=NEXT_TIME if timed or file.sampled else [],
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
-            **self._rest(),
+            **c_possible.parts(self),
             indicators=searched.assign(indicators).lines(),
             **self._is_known(),
             compare=self._compare(),
@@ -367,33 +365,6 @@ class Events:
             "end": [".has_ended = has_ended,"],
         }
 
-    def _rest(self) -> dict[str, list[str]]:
-        """When all states rest: where the conditions hold that make each rate 0.
-
-        Then nothing is integrated, and no event is located that the time leads to.
-        """
-        conditions, zero = [], self.graph.number(0.0)
-        held = c_contacts.held_states(self.file)
-        for state in self.file.of("states"):
-            rate = state.value
-            if rate.op == "if" and rate.arguments[1] is zero and not rate.arguments[0].moves:
-                conditions.append(rate.arguments[0])
-            elif rate in held:
-                conditions.append(held[rate])
-            elif rate is not zero:
-                conditions = []
-                break
-        is_of_time = any(("time", "") in distance.leaves for distance in self.followed)
-        if not conditions or (self.located and not self.limits) or is_of_time:
-            return {"rest": [], "is_at_rest": []}
-        code = Code(self.leaves)
-        rests = code.of(reduce(partial(self.graph.value, "and"), dict.fromkeys(conditions)))
-        code.statements.append(Statement(("return ", ("!=", rests, 0), ";")))
-        head = ["static bool is_at_rest(const void *values_pointer) {"]
-        head += ["    const struct equations_values *values = values_pointer;"]
-        rest = [*head, *indented(code.lines()), "}", ""]
-        return {"rest": rest, "is_at_rest": [".is_at_rest = is_at_rest,"]}
-
     def _comparing(self) -> tuple[Code, Errors, dict[Value, Value]]:
         """Return code that compares, errors of its values, and what moves with its rates."""
         graph, states, inputs = self.graph, self.file.of("states"), self.file.of("inputs")
@@ -434,14 +405,20 @@ class Events:
 
     def _due(self) -> list[str]:
         """Return whether each event of the file is due."""
-        code, stores = Code(self.leaves), []
-        for i, event in enumerate(self.file.events):
-            found = code.of(event.when.value)
-            if event.during is not None:
-                found = "and", found, code.of(event.during.value)
-            stores.append(store(Place("due[", i, "]"), found))
-        code.statements += stores
+        code = Code(self.leaves)
+        found = enumerate(self.dues(code))
+        code.statements += [store(Place("due[", i, "]"), due) for i, due in found]
         return code.lines()
+
+    def dues(self, code: Code) -> list[Operand]:
+        """Return the operand of each event's condition."""
+        found = []
+        for event in self.file.events:
+            due = code.of(event.when.value)
+            if event.during is not None:
+                due = "and", due, code.of(event.during.value)
+            found.append(due)
+        return found
 
     def _segments(self, places: Mapping[str, int]) -> dict[str, object]:
         segments, code = self.graph.segments.values(), Code(self.leaves)
@@ -555,18 +532,6 @@ class Events:
             stores.append(store(Place("indicator[", i, "]"), found))
         code.statements += stores
         return code.lines()
-
-    def _are_possible(self) -> list[str]:
-        """Whether there are relations that are read in these modes, or contacts that may hold."""
-        used = [contact.active for contact in self.graph.contacts.contacts] if self.limits else []
-        used += [self.used[relation.name] for relation in self.located]
-        if not used or any(x is None or x.moves for x in used):
-            return [f"return {str(bool(used)).lower()};"]
-        code = Code(self.leaves)
-        holds = code.of(reduce(partial(self.graph.value, "or"), dict.fromkeys(used)))
-        code.statements.append(Statement(("return ", ("!=", holds, 0), ";")))
-        head = "const struct equations_values *values = values_pointer;"
-        return [head, *code.lines()]
 
     def _described(self, code: Code, relation: Relation) -> Operand:
         """How an indicator follows from the states: from one by a factor, if it can be."""
