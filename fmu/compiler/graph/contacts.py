@@ -74,6 +74,7 @@ class Limit:
     number: int  # of its contact
     used: Value | None
     cases: tuple[Value | None, Value, Value]  # condition, distance if it holds, else
+    most: Value | None = None  # of friction: the largest force that holds, in the first case
 
 
 @dataclass(eq=False)
@@ -544,8 +545,8 @@ class Builder:
         left = graph.value("+", limit, direction.hold)
         right = graph.value("-", limit, direction.hold)
         return [
-            Limit(f"{contact.name}.forward", number, first, (stuck, left, moves)),
-            Limit(f"{contact.name}.backward", number, second, (None, right, right)),
+            Limit(f"{contact.name}.forward", number, first, (stuck, left, moves), limit),
+            Limit(f"{contact.name}.backward", number, second, (None, right, right), limit),
         ]
 
     # ---- Operations ------------------------------------------------------------------------------

@@ -15,13 +15,13 @@ from ..expressions.kinds import CONDITION, WHOLE, Kind
 from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
 from ..plain_c.values import Conditions
-from ..read.content import CALCULATED, COUNTS, SWITCHES, Change, ModelFile, Sampler
+from ..read.content import CALCULATED, COUNTS, OPTIONS, SWITCHES, Change, ModelFile, Sampler
 from ..units import Exponents
 from . import c_contacts, c_possible, c_undefined
 from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
-from .statements import Block, Operand, Place, Statement, field_of, store
+from .statements import Block, Item, Operand, Place, Statement, field_of, store
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 
@@ -384,17 +384,46 @@ class Events:
         return code, Errors(graph, code, given), motion
 
     def _compare(self) -> list[str]:
+        """Return statements that compare relations, of which parameters may leave some out."""
+        groups: dict[Value | None, list[int]] = {}
+        for k, relation in enumerate(self.relations):
+            groups.setdefault(self._of_parameters(self.used[relation.name]), []).append(k)
+        whole = Code(self.leaves)
+        for condition, places in groups.items():
+            items = self._compared(places)
+            if condition is not None:
+                none = {"distance": 0.0, "slope": 0.0, "noise": 1.0, "used": "0"}
+                unused = [store(Place("compared[", k, f"].{key}"), of)
+                          for k in places for key, of in none.items()]  # fmt: skip
+                items = [Block(whole.of(condition), (items, unused))]
+            whole.statements += items
+        return whole.lines()
+
+    def _of_parameters(self, guard: Value | None) -> Value | None:
+        """Return what parameters that have few values say about a condition; None: nothing."""
+        if guard is None:
+            return None
+        names = {variable.name for variable in self.file.of(OPTIONS)}
+        if guard.leaves and {name for _, name in guard.leaves} <= names:
+            return guard
+        if guard.op not in ("and", "or"):
+            return None
+        parts = [*map(self._of_parameters, guard.arguments)]
+        if None in parts:
+            return None if guard.op == "or" else next((x for x in parts if x is not None), None)
+        return parts[0] if parts[0] is parts[1] else self.graph.value(guard.op, *parts)
+
+    def _compared(self, places: Iterable[int]) -> list[Item]:
         code, errors, motion = self._comparing()
         stores = []
-        for k, relation in enumerate(self.relations):
+        for k, relation in ((k, self.relations[k]) for k in places):
             distance, used = relation.distance, self.used[relation.name]
             error = errors.of(distance) if relation.time is None else NONE
             (slope,) = self.graph.derivatives([distance], motion)
             found = {"distance": code.of(distance), "slope": code.of(slope), "noise": error}
             found["used"] = "1" if used is None else code.of(used)
             stores += [store(Place("compared[", k, f"].{key}"), of) for key, of in found.items()]
-        code.statements += stores
-        return code.lines()
+        return [*code.statements, *stores]
 
     def _compare_limits(self) -> list[str]:
         code, errors, motion = self._comparing()
@@ -526,6 +555,9 @@ class Events:
             condition, *cases = limit.cases
             first, second = (self._described(code, Relation(x, True, None, None, one))
                              for x in cases)  # fmt: skip
+            if limit.most is not None:
+                first = "relations_force_indicator", code.of(limit.most)
+                second = first if cases[0] is cases[1] else second
             found = second if condition is None else ("if", code.of(condition), first, second)
             if limit.used is not None:
                 found = "if", code.of(limit.used), found, "unused"
