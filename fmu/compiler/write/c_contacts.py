@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from functools import partial, reduce
 from itertools import pairwise
 
-from ..graph.contacts import BACKWARD, FORWARD, FREE, Contact, Direction, Limit
+from ..graph.contacts import BACKWARD, FORWARD, FREE, STUCK, Contact, Direction, Limit
 from ..graph.graph import Graph, Value
 from ..read.content import ModelFile
 from .c_code import Code, Leaves
 from .c_text import filled, text
 from .errors import Errors
-from .statements import Operand, Place, Statement, store
+from .statements import Block, Item, Operand, Place, Statement, store
+
+HELD_SURELY = 0.75  # of the limit: relations_force_indicator
 
 
 def limits(file: ModelFile) -> list[Limit]:
@@ -27,7 +29,8 @@ def held_states(file: ModelFile) -> dict[Value, Value]:
 def moves_on(file: ModelFile) -> Value | None:
     """Return a condition for contacts to stay as they are; None: there is none.
 
-    Each moves, with valid values, or is off.
+    Each moves, is held far from its limit, or is off, with valid values: only one motion fits, so
+    it goes on.
     """
     if file.graph.contacts is None:
         return None
@@ -50,7 +53,8 @@ def moves_on(file: ModelFile) -> Value | None:
                     valid = both(
                         valid, either(falls, graph.value("==", given["breakaway"], coulomb))
                     )
-                own, off = both(either(forward, backward), valid), is_in(FORWARD)
+                stays = either(either(forward, backward), _is_stuck(graph, direction))
+                own, off = both(stays, valid), is_in(FORWARD)
             else:
                 ends = [given[key] for key in ("lower", "position", "upper") if key in given]
                 inside = [graph.value("<", a, b) for a, b in pairwise(ends)]
@@ -64,6 +68,36 @@ def moves_on(file: ModelFile) -> Value | None:
                 )
             found.append(own)
     return reduce(both, found)
+
+
+def _is_stuck(graph: Graph, direction: Direction) -> Value:
+    """Return whether friction holds a direction, whose limit only parameters move."""
+    given = direction.friction.given
+    if given.get("breakaway", given["coulomb"]).moves or ("time", "") in direction.hold.leaves:
+        return graph.number(0.0)
+    at_rest = graph.value("==", direction.velocity, graph.number(0.0))
+    return graph.value("and", is_mode(graph, direction.friction, STUCK), at_rest)
+
+
+def surely_held(file: ModelFile, leaves: Leaves) -> list[Item]:
+    """Return statements that return false where friction holds more than a good part of its limit.
+
+    They follow those of `moves_on`.
+    """
+    found: list[Item] = []
+    for direction in file.graph.contacts.directions:
+        if not direction.friction:
+            continue
+        given, code, hold = direction.friction.given, Code(leaves), Place("hold")
+        code.statements.append(Statement(("double hold;",)))
+        code.assign({hold: direction.hold})
+        most = "*", HELD_SURELY, code.of(given.get("breakaway", given["coulomb"]))
+        is_below = "<", ("fabs", hold), most
+        code.statements.append(Block(("not", is_below), ([Statement(("return false;",))],)))
+        outer = Code(leaves)
+        is_stuck = outer.of(is_mode(file.graph, direction.friction, STUCK))
+        found += [*outer.statements, Block(is_stuck, (code.statements,))]
+    return found
 
 
 def is_mode(graph: Graph, contact: Contact, mode: int) -> Value:

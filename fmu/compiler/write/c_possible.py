@@ -79,7 +79,10 @@ def _moves_on(events: Events) -> dict[str, list[str]]:
     stays = code.of(quiet)
     for i, due in enumerate(events.dues(code)):
         stays = "and", stays, ("==", due, Place("values->active[", i, "]"))
-    code.statements.append(Statement(("return ", ("and", "values->is_begun", stays), ";")))
+    moves = "not", ("and", "values->is_begun", stays)
+    code.statements.append(Block(moves, ([Statement(("return false;",))],)))
+    code.statements += c_contacts.surely_held(events.file, events.leaves)
+    code.statements.append(Statement(("return true;",)))
     head = ["static bool moves_on(const void *values_pointer) {"]
     head += ["    const struct equations_values *values = values_pointer;"]
     return {
