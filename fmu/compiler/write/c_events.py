@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 from ..expressions.expression import in_order
 from ..expressions.kinds import CONDITION, WHOLE, Kind
-from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
+from ..graph.graph import CONDITIONS, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
 from ..plain_c.values import Conditions
 from ..read.content import CALCULATED, COUNTS, OPTIONS, SWITCHES, Change, ModelFile, Sampler
 from ..units import Exponents
-from . import c_contacts, c_possible, c_undefined
+from . import c_contacts, c_indicators, c_possible, c_undefined
 from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
@@ -309,7 +309,7 @@ class Events:
                 for line in self._change(i, change)
             ],
             **c_undefined.parts(file, self.leaves, in_domain),
-            descriptions=self._describe(),
+            descriptions=c_indicators.describe(self),
             names=", ".join(
                 [text(file.relation_texts[places[r.name]][:100]) for r in self.located]
                 + [text(limit.name) for limit in self.limits]
@@ -543,45 +543,6 @@ class Events:
                 bounds = f"1, {len(kind)}" if is_item else "0, 1"
             rows.append(f"{{{text(name)}, {bounds}}},")
         return rows
-
-    def _describe(self) -> list[str]:
-        code, stores, one = Code(self.leaves), [], self.graph.number(1.0)
-        for i, relation in enumerate(self.located):
-            found, used = self._described(code, relation), self.used[relation.name]
-            if used is not None:
-                found = "if", code.of(used), found, "unused"
-            stores.append(store(Place("indicator[", i, "]"), found))
-        for i, limit in enumerate(self.limits, len(self.located)):
-            condition, *cases = limit.cases
-            first, second = (self._described(code, Relation(x, True, None, None, one))
-                             for x in cases)  # fmt: skip
-            if limit.most is not None:
-                first = "relations_force_indicator", code.of(limit.most)
-                second = first if cases[0] is cases[1] else second
-            found = second if condition is None else ("if", code.of(condition), first, second)
-            if limit.used is not None:
-                found = "if", code.of(limit.used), found, "unused"
-            stores.append(store(Place("indicator[", i, "]"), found))
-        code.statements += stores
-        return code.lines()
-
-    def _described(self, code: Code, relation: Relation) -> Operand:
-        """How an indicator follows from the states: from one by a factor, if it can be."""
-        distance, zero = relation.distance, self.graph.number(0.0)
-        moving = [leaf for leaf in distance.leaves if leaf[0] in MOVING]
-        if len(moving) == 1 and moving[0][0] == "state":
-            place, x = next(
-                (i, x) for i, x in enumerate(self.file.of("states")) if x.name == moving[0][1]
-            )
-            factor = self.graph.derivative(distance, x.leaf)
-            if not factor.moves:
-                rate = zero if ("time", "") in x.value.leaves else x.value  # unknown here
-                at_zero = Code(code.leaves.but({moving[0]: 0.0}))
-                at_zero.statements = code.statements  # which have its constants, too
-                offset = at_zero.of(distance)
-                holds, factor, rate = (code.of(v) for v in (relation.mode, factor, rate))
-                return "relations_state_indicator", place, holds, factor, offset, rate
-        return "relations_model_indicator", code.of(relation.limit or zero)
 
 
 def _every_name(sampler: Sampler) -> str:
