@@ -6,6 +6,7 @@ from typing import Any
 from ..expressions.expression import RELATIONS, in_order
 from ..expressions.kinds import CONDITION
 from ..graph.band import band
+from ..graph.contacts import REACHED
 from ..graph.curve import Curve
 from ..graph.graph import FALLIBLE, Value, is_number
 from ..names import Field
@@ -224,7 +225,7 @@ def _has_kinks(followed: tuple[dict[Value, Value], list[Value]]) -> bool:
     """Return whether a value that C compares decides on a rate or distance, without an event."""
     rates, distances = followed
     nodes = in_order([*rates.values(), *distances])
-    return any(v.op in RELATIONS and v.moves for v in nodes)
+    return any(v.op in RELATIONS and v.moves and v.name != REACHED for v in nodes)
 
 
 def _series(file: ModelFile, series: Series, has_domains: bool) -> dict[str, object]:
