@@ -21,11 +21,8 @@ static enum status follow_contacts(const struct call *call, const struct event *
     for (int count = 0; differs && status == STATUS_OK && count < MOST_ROUNDS; count++) {
         differs = false;
         status = contacts_update(call, event, is_first && count == 0, is_start, &differs);
-        if (differs && status == STATUS_OK && is_read) {
-            modes_settle(call);
-        }
         *changes |= differs;
-        differs = differs && is_read;
+        differs = differs && status == STATUS_OK && is_read && modes_settle(call);
     }
     if (differs && status == STATUS_OK) {
         if (event != NULL && event->reason != NULL) {
@@ -191,11 +188,11 @@ static enum status perform(const struct call *call, int number, const struct eve
         return status;
     }
     update_timed_modes(call);
-    modes_settle(call);
+    (void)modes_settle(call);
     allow_rounding(call, true);
     modes_switch_fallen(call);
     allow_rounding(call, false);
-    modes_settle(call);
+    (void)modes_settle(call);
     modes_clear_turned(call);
     return STATUS_OK;
 }
@@ -323,7 +320,7 @@ static void insist(const struct call *call) {
         }
     }
     if (is_any && is_back) {
-        modes_settle(call);
+        (void)modes_settle(call);
     }
     modes_clear_turned(call);
 }
@@ -346,10 +343,10 @@ static void pass(const struct call *call, const struct event *event) {
         }
     }
     if (event->triggered != NULL) {
-        modes_settle(call);
+        (void)modes_settle(call);
         insist(call);
     } else {
-        modes_update(call, false);
+        (void)modes_update(call, false);
     }
 }
 
@@ -417,7 +414,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
     if (was_begun) {
         pass(&call, event);
     } else if (model->sampler_count > 0) {
-        modes_settle(&call);
+        (void)modes_settle(&call);
     }
     bool changes = false;
     if (!was_begun) {
