@@ -343,10 +343,14 @@ static void describe_stops(const struct rp_plant_values *values, int contact, in
     const size_t q = (size_t)joint;
     const double dq = values->dq[joint];
     // a contact that has just begun, or ended, rises as much as its joint moves that way
-    const struct indicator over_lower = {INDICATOR_OF_STATE, q, 1.0, -p->lower[joint], dq > 0.0};
-    const struct indicator below_lower = {INDICATOR_OF_STATE, q, -1.0, p->lower[joint], dq < 0.0};
-    const struct indicator below_upper = {INDICATOR_OF_STATE, q, -1.0, p->upper[joint], dq < 0.0};
-    const struct indicator over_upper = {INDICATOR_OF_STATE, q, 1.0, -p->upper[joint], dq > 0.0};
+    const struct indicator over_lower = {INDICATOR_OF_STATE, q,        1.0,
+                                         -p->lower[joint],   dq > 0.0, 0.0};
+    const struct indicator below_lower = {INDICATOR_OF_STATE, q,        -1.0,
+                                          p->lower[joint],    dq < 0.0, 0.0};
+    const struct indicator below_upper = {INDICATOR_OF_STATE, q,        -1.0,
+                                          p->upper[joint],    dq < 0.0, 0.0};
+    const struct indicator over_upper = {INDICATOR_OF_STATE, q,        1.0,
+                                         -p->upper[joint],   dq > 0.0, 0.0};
     if (contact == RP_PLANT_APART) {
         *of_joint[LOWER] = over_lower;
         *of_joint[UPPER] = below_upper;
@@ -357,7 +361,7 @@ static void describe_stops(const struct rp_plant_values *values, int contact, in
     if (p->stop_damping[joint] > 0.0) {
         const double sign = abs(contact) == RP_PLANT_PUSHED ? 1.0 : -1.0;
         const double factor = -sign * side * p->stop_damping[joint];
-        *of_joint[PUSH] = (struct indicator){INDICATOR_OF_STATE, 2 + q, factor, sign, false};
+        *of_joint[PUSH] = (struct indicator){INDICATOR_OF_STATE, 2 + q, factor, sign, false, 0.0};
     }
 }
 

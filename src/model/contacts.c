@@ -16,6 +16,7 @@ struct work {
     const struct event *event; // or NULL
     struct contacts_measured now;
     double *hold, *acceleration, *before; // per direction
+    int *friction;                        // that may hold it, or -1
     int *sense;                           // of a closed stop's force; 0 if there is none
     int *stop;                            // contact that is closed
     int *rests;                           // 1 if the velocity is 0
@@ -25,6 +26,8 @@ struct work {
     int *struck;                          // per contact: 1 if it had an impact at this instant
     int *modes;                           // per contact, before
     bool jumps;
+    bool is_decided; // since values were measured
+    bool fits;       // as decided
 };
 
 static struct contacts_measured measured_in(const struct contacts *model, double *room) {
@@ -50,7 +53,8 @@ static struct contacts_measured measured_in(const struct contacts *model, double
     return to;
 }
 
-static void measure(const struct work *work) {
+static void measure(struct work *work) {
+    work->is_decided = false;
     const struct call *call = work->call;
     const double *tolerance = work->event != NULL ? work->event->tolerance : call->room.zeros;
     work->model->measure(call->values, call->t, tolerance, &work->now);
@@ -85,20 +89,22 @@ static int sense_of(const struct work *work, int contact, int mode) {
     return (mode == STOPS_LOWER ? 1 : -1) * sign_of(work->now.ratio[contact]);
 }
 
-/* Returns the friction of a direction that may hold it, or -1. */
-static int friction_of(const struct work *work, int direction) {
+/* Finds the frictions that may hold directions: first ones of their contacts. */
+static void find_frictions(const struct work *work) {
+    for (int k = 0; k < work->model->direction_count; k++) {
+        work->friction[k] = -1;
+    }
     for (int e = 0; e < work->model->contact_count; e++) {
         const struct contact *contact = &work->model->contact[e];
-        if (contact->direction == direction && contact->is_friction && work->now.active[e] != 0.0) {
-            return e;
+        if (contact->is_friction && work->now.active[e] != 0.0) {
+            work->friction[contact->direction] = e;
         }
     }
-    return -1;
 }
 
 /* Returns the response of a direction's acceleration to the force that holds another one. */
 static double response(const struct work *work, int to, int of) {
-    const int friction = friction_of(work, of);
+    const int friction = work->friction[of];
     const int contact = friction >= 0 ? friction : work->stop[of];
     const double own = work->now.response[to * work->model->contact_count + contact];
     return friction >= 0 ? -own : own / work->now.ratio[contact];
@@ -236,7 +242,7 @@ static double least_velocity(const struct work *work, int k) {
 /* Finds which velocities are 0 now, of directions that something may hold. */
 static void find_rest_now(struct work *work) {
     for (int k = 0; k < work->model->direction_count; k++) {
-        const bool may_rest = friction_of(work, k) >= 0 || work->sense[k] != 0;
+        const bool may_rest = work->friction[k] >= 0 || work->sense[k] != 0;
         work->rests[k] = may_rest && fabs(work->now.velocity[k]) <= least_velocity(work, k);
     }
 }
@@ -256,7 +262,7 @@ static bool is_held(const struct work *work, int direction) {
 static void find_rest(struct work *work) {
     for (int k = 0; k < work->model->direction_count; k++) {
         const double speed = fabs(work->now.velocity[k]);
-        const int friction = friction_of(work, k);
+        const int friction = work->friction[k];
         const bool has_halted = friction >= 0 && work->hit[friction] != 0;
         const bool may_rest = friction >= 0 || work->sense[k] != 0;
         const double most = is_held(work, k) && !work->model->direction[k].is_plain
@@ -362,6 +368,9 @@ static void write_box(const struct work *work, const int member[], int count, co
 /* Writes which of the directions at rest begin to move, with all accelerations. Returns false if no
  * motion fits. */
 static bool decide(struct work *work) {
+    if (work->is_decided) {
+        return work->fits;
+    }
     bool fits = true;
     accelerate(work, work->acceleration);
     memset(work->pattern, 0, (size_t)work->model->direction_count * sizeof *work->pattern);
@@ -376,7 +385,7 @@ static bool decide(struct work *work) {
         }
         write_box(work, member, count, work->acceleration, &box);
         for (int i = 0; i < count; i++) {
-            const int friction = friction_of(work, member[i]);
+            const int friction = work->friction[member[i]];
             const double limit = friction >= 0 ? work->now.breakaway[friction] : 0.0;
             box.low[i] = work->sense[member[i]] < 0 ? -INFINITY : -limit;
             box.high[i] = work->sense[member[i]] > 0 ? INFINITY : limit;
@@ -392,6 +401,8 @@ static bool decide(struct work *work) {
             work->acceleration[member[i]] = found.a[i];
         }
     }
+    work->is_decided = true;
+    work->fits = fits;
     return fits;
 }
 
@@ -420,18 +431,24 @@ static void apply_impulses(struct work *work, const double P[], const int is_str
         *double_at(work, contact->loss) -= 0.5 * P[k] * (1.0 - restitution[k]) * work->before[k];
         work->struck[e] = 1;
     }
-    measure(work);
     const int count = work->model->direction_count;
-    for (int pass = 0; pass < count; pass++) {
+    bool are_plain = true;
+    for (int k = 0; k < count; k++) {
+        are_plain &= !is_struck[k] || work->model->direction[k].is_plain;
+    }
+    for (int pass = 0; pass < (are_plain ? 1 : count); pass++) {
         for (int k = 0; k < count; k++) {
             if (is_struck[k]) {
+                if (!are_plain) {
+                    measure(work); // others may have moved where this one rests
+                }
                 const double velocity = 0.0 - restitution[k] * work->before[k];
                 set_state(work, work->model->direction[k].own,
                           work->now.rest[k] + velocity / work->now.factor[k]);
-                measure(work);
             }
         }
     }
+    measure(work);
     find_rest_now(work);
 }
 
@@ -483,11 +500,12 @@ static void catch_on_stops(struct work *work) {
     (void)decide(work);
     is_any = false;
     double *P = work->hold, *change = work->acceleration;
+    int *caught = work->stop + count;
     for (int k = 0; k < count; k++) {
         const bool hardly = hardly_leaves(work, k);
         const double speed = fabs(work->now.velocity[k]);
         is_any |= hardly;
-        work->pattern[k] = hardly || (work->sense[k] != 0 && speed <= least_velocity(work, k));
+        caught[k] = hardly || (work->sense[k] != 0 && speed <= least_velocity(work, k));
     }
     if (!is_any) {
         return;
@@ -497,10 +515,10 @@ static void catch_on_stops(struct work *work) {
         work->before[k] = work->now.velocity[k];
         P[k] = 0.0;
     }
-    solve_impulses(work, work->pattern, change, P);
+    solve_impulses(work, caught, change, P);
     double *plastic = work->acceleration;
     memset(plastic, 0, (size_t)count * sizeof *plastic);
-    apply_impulses(work, P, work->pattern, plastic);
+    apply_impulses(work, P, caught, plastic);
 }
 
 static bool moves_into_stop(const struct work *work) {
@@ -578,7 +596,7 @@ static void write_modes(const struct work *work) {
 
 /* Returns the place of the limit that ends the rest of a direction in a sense. */
 static int limit_of(const struct work *work, int k, int sign) {
-    const int friction = friction_of(work, k);
+    const int friction = work->friction[k];
     const int contact = friction >= 0 ? friction : work->stop[k];
     const int is_second = friction >= 0 ? sign < 0 : sense_of(work, contact, STOPS_LOWER) != sign;
     return 2 * contact + is_second;
@@ -589,7 +607,7 @@ static int side_at_limit(const struct work *work, int k) {
     const struct compared *compared = work->call->room.compared;
     for (int sign = 1; sign >= -1 && work->rests[k] && work->pattern[k] == 0; sign -= 2) {
         const bool is_open = work->sense[k] == 0 || work->sense[k] == sign;
-        const bool may_leave = is_open && (friction_of(work, k) >= 0 || work->sense[k] == sign);
+        const bool may_leave = is_open && (work->friction[k] >= 0 || work->sense[k] == sign);
         const struct compared *limit = &compared[limit_of(work, k, sign)];
         const bool is_near = work->leaves[k] == sign && limit->distance <= limit->noise;
         if (may_leave && (limit->distance <= 0.0 || is_near)) {
@@ -606,7 +624,7 @@ static bool may_break_away(const struct work *work, int k) {
     if (!work->rests[k] || work->pattern[k] != 0) {
         return false;
     }
-    const int friction = friction_of(work, k);
+    const int friction = work->friction[k];
     const double limit = friction >= 0 ? work->now.breakaway[friction] : 0.0;
     const double force = work->hold[k];
     const double scale = near * (limit + fabs(force));
@@ -703,7 +721,8 @@ static struct work work_of(const struct call *call, const struct event *event) {
     work.pattern = work.rests + directions;
     work.leaves = work.pattern + directions;
     work.stop = work.leaves + directions;
-    work.hit = work.stop + 2 * directions;
+    work.friction = work.stop + 2 * directions;
+    work.hit = work.friction + directions;
     work.struck = work.hit + model->contact_count;
     work.modes = work.struck + model->contact_count;
     return work;
@@ -718,7 +737,7 @@ static enum status refuse_motion(const struct work *work) {
     const size_t size = work->event->reason_size;
     (void)snprintf(to, size, "no motion fits");
     for (int k = 0, named = 0; k < work->model->direction_count; k++) {
-        const int friction = friction_of(work, k);
+        const int friction = work->friction[k];
         const int e = friction >= 0 ? friction : work->stop[k];
         if (work->rests[k]) {
             const size_t length = strlen(to);
@@ -733,6 +752,7 @@ enum status contacts_update(const struct call *call, const struct event *event, 
                             bool is_start, bool *changes) {
     struct work work = work_of(call, event);
     measure(&work);
+    find_frictions(&work);
     const enum status status = check(&work, is_start);
     if (status != STATUS_OK && event != NULL) {
         return status;

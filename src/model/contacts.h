@@ -74,7 +74,7 @@ struct contacts {
 struct contacts_room {
     double *measured;
     double *hold; /* 3 per direction */
-    int *found;   /* 6 per direction, 3 per contact */
+    int *found;   /* 7 per direction, 3 per contact */
 };
 
 #define CONTACTS_MEASURED(directions, contacts, moved)                                             \
@@ -83,7 +83,7 @@ struct contacts_room {
 #define CONTACTS_ROOM(directions, contacts, moved)                                                 \
     (struct contacts_room) {                                                                       \
         (double[CONTACTS_MEASURED(directions, contacts, moved)]){0},                               \
-            (double[3 * (directions)]){0}, (int[6 * (directions) + 3 * (contacts)]) {              \
+            (double[3 * (directions)]){0}, (int[7 * (directions) + 3 * (contacts)]) {              \
             0                                                                                      \
         }                                                                                          \
     }

@@ -8,7 +8,7 @@ enum { MOST = CONTACTS_MOST_COUPLED };
 
 /* Writes T and a where `leaves` says which stay, by the linear equations of those. */
 static void solve_pattern(const struct box *box, struct box_solution *to) {
-    double matrix[MOST * (MOST + 1)] = {0.0};
+    double matrix[MOST * (MOST + 1)];
     double right[MOST], held[MOST];
     int member[MOST], pivot[MOST];
     int count = 0;
@@ -101,6 +101,18 @@ static void look_at_all(const struct box *box, struct box_solution *solution) {
     }
 }
 
+/* The same of one unknown, which stays in most cases. */
+static void solve_one(const struct box *box, struct box_solution *to) {
+    to->leaves[0] = 0;
+    to->T[0] = -box->a0[0] / box->W[0][0];
+    to->a[0] = 0.0;
+    if (to->T[0] >= box->low[0] && to->T[0] <= box->high[0]) {
+        to->misfit = 0.0;
+    } else {
+        look_at_all(box, to);
+    }
+}
+
 /* Lets one unknown do what its violation asks for. */
 static void turn(const struct box *box, struct box_solution *at, int i) {
     at->leaves[i] = at->leaves[i] != 0 ? 0 : at->T[i] > box->high[i] ? -1 : 1;
@@ -132,7 +144,9 @@ static void pivot(const struct box *box, struct box_solution *solution) {
 
 void box_solve(const struct box *box, struct box_solution *solution) {
     enum { MOST_LOOKED_AT = 3 };
-    if (box->count <= MOST_LOOKED_AT) {
+    if (box->count == 1) {
+        solve_one(box, solution);
+    } else if (box->count <= MOST_LOOKED_AT) {
         look_at_all(box, solution);
     } else {
         pivot(box, solution);

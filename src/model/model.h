@@ -33,9 +33,10 @@ struct indicator {
     /* of INDICATOR_OF_STATE */
     size_t state;
     double factor;
-    double offset; /* of INDICATOR_OF_MODEL: size of the limit from which the indicator is the
-                      distance; its error follows from it if the model has no `errors` */
-    bool rises;    /* of INDICATOR_OF_STATE: it may be 0 now, but its slope is above 0 */
+    double offset;       /* of INDICATOR_OF_MODEL: size of the limit from which the indicator is the
+                            distance; its error follows from it if the model has no `errors` */
+    bool rises;          /* of INDICATOR_OF_STATE: it may be 0 now, but its slope is above 0 */
+    double is_far_above; /* of INDICATOR_OF_MODEL: far above its error, from here on; 0: unknown */
 };
 
 struct event {

@@ -136,15 +136,20 @@ static void allow_rounding(const struct call *call, bool is_allowed) {
     }
 }
 
-/* Updates all modes after a change of values; call->room.before: the relations before it. */
-static void follow_change(const struct call *call) {
+/* Updates all modes after a change of values; call->room.before: the relations before it. Returns
+ * true if some have changed. */
+static bool follow_change(const struct call *call) {
     update_timed_modes(call);
-    modes_settle(call);
+    bool changes = modes_settle(call);
     allow_rounding(call, true);
     modes_switch_fallen(call);
     allow_rounding(call, false);
-    modes_settle(call);
+    changes |= modes_settle(call);
+    for (int k = 0; k < call->model->relation_count; k++) {
+        changes |= call->room.turned[k] != 0;
+    }
     modes_clear_turned(call);
+    return changes;
 }
 
 /* Performs an event or a sampler, and updates all modes. */
@@ -154,7 +159,7 @@ static enum status perform(const struct call *call, int number, const struct eve
     if (status != STATUS_OK) {
         return status;
     }
-    follow_change(call);
+    (void)follow_change(call);
     return STATUS_OK;
 }
 
@@ -281,7 +286,7 @@ static void insist(const struct call *call) {
         }
     }
     if (is_any && is_back) {
-        modes_settle(call);
+        (void)modes_settle(call);
     }
     modes_clear_turned(call);
 }
@@ -304,10 +309,10 @@ static void pass(const struct call *call, const struct event *event) {
         }
     }
     if (event->triggered != NULL) {
-        modes_settle(call);
+        (void)modes_settle(call);
         insist(call);
     } else {
-        modes_update(call, false);
+        (void)modes_update(call, false);
     }
 }
 
@@ -363,11 +368,8 @@ static enum status follow_contacts(const struct call *call, const struct event *
             modes_compare(call, call->room.tolerance, call->room.before);
         }
         status = contacts_update(call, event, is_first && count == 0, is_start, &differs);
-        if (differs && status == STATUS_OK && is_read) {
-            follow_change(call);
-        }
         *changes |= differs;
-        differs = differs && is_read;
+        differs = differs && status == STATUS_OK && is_read && follow_change(call);
     }
     if (differs && status == STATUS_OK) {
         if (event != NULL && event->reason != NULL) {
@@ -425,7 +427,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
     if (was_begun) {
         pass(&call, event);
     } else if (model->sampler_count > 0) {
-        modes_settle(&call);
+        (void)modes_settle(&call);
     }
     bool changes = false;
     if (!was_begun) {

@@ -234,3 +234,9 @@ static inline struct indicator relations_state_indicator(size_t state, int holds
 static inline struct indicator relations_model_indicator(double limit) {
     return (struct indicator){.kind = INDICATOR_OF_MODEL, .offset = fabs(limit)};
 }
+
+/* Returns the indicator of a force that holds a direction, a distance from what friction can. */
+static inline struct indicator relations_force_indicator(double limit) {
+    return (struct indicator){
+        .kind = INDICATOR_OF_MODEL, .offset = fabs(limit), .is_far_above = 0.25 * fabs(limit)};
+}

@@ -166,21 +166,25 @@ static bool lacks_solution(const struct call *call) {
  * end, the first wrong one changes alone: Murty's rule for linear complementarity. */
 enum { ROUNDS_IN_CIRCLES = 20 };
 
-void modes_update(const struct call *call, bool is_exact) {
+bool modes_update(const struct call *call, bool is_exact) {
     const int relations = call->model->relation_count;
     bool changes = true;
+    bool is_any = false;
     for (int count = 0; changes && count < relations; count++) {
         changes = update_modes(call, is_exact);
+        is_any |= changes;
         if (!changes && count == 0 && lacks_solution(call)) {
             follow_solutions(call);
-            changes = true;
+            changes = is_any = true;
         }
     }
     const int rounds =
         call->model->is_circular != NULL && changes ? ROUNDS_IN_CIRCLES * relations : 0;
     for (int count = 0; changes && count < rounds; count++) {
         changes = update_first_mode(call, is_exact);
+        is_any |= changes;
     }
+    return is_any;
 }
 
 /* True if the distance of a relation contradicts its mode or, at the limit, will at once. */
@@ -232,11 +236,13 @@ static bool pass_by_time(const struct call *call) {
     return changes;
 }
 
-void modes_settle(const struct call *call) {
-    modes_update(call, false);
+bool modes_settle(const struct call *call) {
+    bool changes = modes_update(call, false);
     for (int count = 0; count < call->model->relation_count && pass_by_time(call); count++) {
-        modes_update(call, false);
+        (void)modes_update(call, false);
+        changes = true;
     }
+    return changes;
 }
 
 /* Writes the modes that follow from the values, whatever they were before. Returns true if some
@@ -272,7 +278,7 @@ void modes_follow_inputs(const struct call *call) {
 void modes_begin(const struct call *call) {
     set_modes_from_values(call, false);
     follow_solutions(call);
-    modes_update(call, true);
+    (void)modes_update(call, true);
 }
 
 void modes_switch_fallen(const struct call *call) {

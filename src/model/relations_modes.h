@@ -62,11 +62,13 @@ void modes_compare(const struct call *call, const double state_errors[],
 /* Compares the limits of all contacts, two of each. */
 void modes_compare_limits(const struct call *call, struct compared compared[]);
 
-/* Updates all modes at an event. Where one value jumps, others may come to their limits. */
-void modes_settle(const struct call *call);
+/* Updates all modes at an event. Where one value jumps, others may come to their limits. True if
+ * some may have changed. */
+bool modes_settle(const struct call *call);
 
-/* Updates modes until none changes. is_exact: distances are exact to the last bit. */
-void modes_update(const struct call *call, bool is_exact);
+/* Updates modes until none changes. is_exact: distances are exact to the last bit. True if some may
+ * have changed. */
+bool modes_update(const struct call *call, bool is_exact);
 
 /* Writes the modes that follow from inputs only, each after those that its relation reads. */
 void modes_follow_inputs(const struct call *call);

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 BACKWARD, STUCK, FORWARD = 1, 2, 3  # modes of friction
 FREE, LOWER, UPPER = 1, 2, 3  # modes of stops
+REACHED = "reached"  # name of what steps cannot hide: reach of struct model_events
+# square of a velocity in scales of the fall, and ratio up to which rounding leaves nothing there
+FAST, MOST_FALL = 49.0, 1e5
 MOST_COUPLED = 8  # src/model/contacts.h
 STILL = ("parameter", "integer", "mode", "discrete")  # leaves of factors
 OF_OFFSETS = (*STILL, "time")
@@ -77,6 +80,7 @@ class Limit:
     number: int  # of its contact
     used: Value | None
     cases: tuple[Value | None, Value, Value]  # condition, distance if it holds, else
+    most: Value | None = None  # of friction: the largest force that holds, in the first case
 
 
 @dataclass(eq=False)
@@ -301,14 +305,19 @@ class Builder:
         if "breakaway" not in given:
             size = given["coulomb"]
         else:
+            coulomb, breakaway = given["coulomb"], given["breakaway"]
             w = graph.value("/", given["velocity"], given["stribeck"])
-            e = graph.value("exp", graph.value("negative", graph.value("*", w, w)))
-            at_rest = graph.value("*", given["breakaway"], e)
-            slides = graph.value("*", given["coulomb"], graph.value("-", self.one, e))
+            square = graph.value("*", w, w)
+            e = graph.value("exp", graph.value("negative", square), name=REACHED)
+            at_rest = graph.value("*", breakaway, e)
+            slides = graph.value("*", coulomb, graph.value("-", self.one, e))
+            most = graph.value("*", graph.number(MOST_FALL), coulomb)
+            is_fast = graph.value(">", square, graph.number(FAST), name=REACHED)
+            has_fallen = graph.value("and", is_fast, graph.value("<", breakaway, most))
             size = self.choice(
                 graph.value(">", given["stribeck"], self.zero),
-                graph.value("+", at_rest, slides),
-                given["coulomb"],
+                self.choice(has_fallen, coulomb, graph.value("+", at_rest, slides)),
+                coulomb,
             )
         return size if contact.active is None else self.choice(contact.active, size, self.zero)
 
@@ -577,8 +586,8 @@ class Builder:
         left = graph.value("+", limit, direction.hold)
         right = graph.value("-", limit, direction.hold)
         return [
-            Limit(contact.name, "forward", number, first, (stuck, left, moves)),
-            Limit(contact.name, "backward", number, second, (None, right, right)),
+            Limit(contact.name, "forward", number, first, (stuck, left, moves), limit),
+            Limit(contact.name, "backward", number, second, (None, right, right), limit),
         ]
 
     # ---- Operations ------------------------------------------------------------------------------

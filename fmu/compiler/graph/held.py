@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 MOST_DIRECTIONS = 3  # of a block: it has as many cases as there are sets of them
 
+ZERO, ONE = ("number", 0.0), ("number", 1.0)
 Case = frozenset[int]  # directions that are held
 
 
@@ -120,7 +121,7 @@ class Held:
         """Solve equations: accelerations are 0 or, of what moves, the unknowns themselves."""
         left, found = dict(equations), {}
         while left:
-            k = min(left, key=lambda k: self._slope(left[k], k, held).moves)
+            k = min(left, key=lambda k: (self._slope(left[k], k, held).moves, k not in held))
             found[k] = self._alone(left.pop(k), k, held)
             by = {self.unknown[k]: found[k]}
             left = dict(zip(left, replaced(self.graph, left.values(), by), strict=True))
@@ -165,18 +166,25 @@ class Held:
 
 def is_opposite(a: Value, b: Value) -> bool:
     """Return whether a value is written as the negative of another one."""
-    if a.op == b.op == "number":
-        return a.number == -b.number
-    if (a.op, b.op).count("negative") == 1:
-        return a.arguments[0] is b if a.op == "negative" else b.arguments[0] is a
-    for one, other in ((a, b), (b, a)):
-        if one.op == "*" and any(x.op == "number" and x.number == -1.0 for x in one.arguments):
-            return other in one.arguments
-    if a.op != b.op or len(a.arguments) != 2:
-        return False
-    (a1, a2), (b1, b2) = a.arguments, b.arguments
-    if a.op in ("+", "-"):
-        return is_opposite(a1, b1) and is_opposite(a2, b2)
-    if a.op in ("*", "/"):
-        return (is_opposite(a1, b1) and a2 is b2) or (a1 is b1 and is_opposite(a2, b2))
-    return False
+    (sign, form), (other_sign, other) = _signed(a), _signed(b)
+    return form == other and (sign != other_sign or form == ZERO)
+
+
+def _signed(value: Value) -> tuple[int, tuple]:
+    """Return the sign with which a value is written, and its form without signs and factors 1."""
+    if value.op == "number":
+        return -1 if value.number < 0.0 else 1, ("number", abs(value.number))
+    if value.op not in ("negative", "*", "/", "+", "-"):
+        return 1, ("value", value)
+    found = [_signed(x) for x in value.arguments]
+    sign, form = found[0]
+    if value.op == "negative":
+        return -sign, form
+    other_sign, other = found[1]
+    if value.op in ("*", "/"):
+        if other == ONE:
+            return sign * other_sign, form
+        is_plain = value.op == "*" and form == ONE
+        return sign * other_sign, other if is_plain else (value.op, form, other)
+    relative = sign * other_sign * (1 if value.op == "+" else -1)
+    return sign, ("+", form, other, relative)

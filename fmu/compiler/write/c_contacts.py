@@ -1,14 +1,18 @@
 """Dry friction and stops in C (src/model/contacts.h): tables, limits and what decides them."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial, reduce
+from itertools import pairwise
 
-from ..graph.contacts import Contact, Direction, Limit
-from ..graph.graph import Value
+from ..graph.contacts import BACKWARD, FORWARD, FREE, STUCK, Contact, Direction, Limit
+from ..graph.graph import Graph, Value
 from ..read.content import ModelFile, variable_of
 from .c_code import Code, Leaves
 from .c_text import filled, text
 from .errors import Errors
-from .statements import Operand, Place, Statement, store
+from .statements import Block, Item, Operand, Place, Statement, store
+
+HELD_SURELY = 0.75  # of the limit: relations_force_indicator
 
 
 def limits(file: ModelFile) -> list[Limit]:
@@ -20,6 +24,85 @@ def held_states(file: ModelFile) -> dict[Value, Value]:
     """Return states that are 0 while a direction is held, with that condition."""
     found = file.graph.contacts.directions if file.graph.contacts else []
     return {d.own: d.held for d in found if d.velocity is d.own}
+
+
+def moves_on(file: ModelFile) -> Value | None:
+    """Return a condition for contacts to stay as they are; None: there is none.
+
+    Each moves, is held far from its limit, or is off, with valid values: only one motion fits, so
+    it goes on.
+    """
+    if file.graph.contacts is None:
+        return None
+    graph, found = file.graph, []
+    zero, one = graph.number(0.0), graph.number(1.0)
+    both, either = partial(graph.value, "and"), partial(graph.value, "or")
+    for direction in file.graph.contacts.directions:
+        if not _is_plain(direction):
+            return None
+        for contact in direction.contacts:
+            given, is_in = contact.given, partial(is_mode, graph, contact)
+            if contact.is_friction:
+                velocity, coulomb = given["velocity"], given["coulomb"]
+                forward = both(is_in(FORWARD), graph.value(">", velocity, zero))
+                backward = both(is_in(BACKWARD), graph.value("<", velocity, zero))
+                valid = graph.value(">=", coulomb, zero)
+                if "breakaway" in given:
+                    falls = graph.value(">", given["breakaway"], coulomb)
+                    falls = both(falls, graph.value(">", given["stribeck"], zero))
+                    valid = both(
+                        valid, either(falls, graph.value("==", given["breakaway"], coulomb))
+                    )
+                stays = either(either(forward, backward), _is_stuck(graph, direction))
+                own, off = both(stays, valid), is_in(FORWARD)
+            else:
+                ends = [given[key] for key in ("lower", "position", "upper") if key in given]
+                inside = [graph.value("<", a, b) for a, b in pairwise(ends)]
+                inside.append(graph.value(">=", given["restitution"], zero))
+                inside.append(graph.value("<=", given["restitution"], one))
+                off = is_in(FREE)
+                own = reduce(both, inside, off)
+            if contact.active is not None:
+                own = either(
+                    both(contact.active, own), both(graph.value("not", contact.active), off)
+                )
+            found.append(own)
+    return reduce(both, found)
+
+
+def _is_stuck(graph: Graph, direction: Direction) -> Value:
+    """Return whether friction holds a direction, whose limit only parameters move."""
+    given = direction.friction.given
+    if given.get("breakaway", given["coulomb"]).moves or ("time", "") in direction.hold.leaves:
+        return graph.number(0.0)
+    at_rest = graph.value("==", direction.velocity, graph.number(0.0))
+    return graph.value("and", is_mode(graph, direction.friction, STUCK), at_rest)
+
+
+def surely_held(file: ModelFile, leaves: Leaves) -> list[Item]:
+    """Return statements that return false where friction holds more than a good part of its limit.
+
+    They follow those of `moves_on`.
+    """
+    found: list[Item] = []
+    for direction in file.graph.contacts.directions:
+        if not direction.friction:
+            continue
+        given, code, hold = direction.friction.given, Code(leaves), Place("hold")
+        code.statements.append(Statement(("double hold;",)))
+        code.assign({hold: direction.hold})
+        most = "*", HELD_SURELY, code.of(given.get("breakaway", given["coulomb"]))
+        is_below = "<", ("fabs", hold), most
+        code.statements.append(Block(("not", is_below), ([Statement(("return false;",))],)))
+        outer = Code(leaves)
+        is_stuck = outer.of(is_mode(file.graph, direction.friction, STUCK))
+        found += [*outer.statements, Block(is_stuck, (code.statements,))]
+    return found
+
+
+def is_mode(graph: Graph, contact: Contact, mode: int) -> Value:
+    """Return whether a contact is in a mode."""
+    return graph.value("==", contact.mode, graph.number(float(mode)))
 
 
 def distance(file: ModelFile, limit: Limit) -> Value:
@@ -123,8 +206,13 @@ def _contact_row(file: ModelFile, contact: Contact, states: dict[Value, int]) ->
 def _direction_row(file: ModelFile, direction: Direction, states: dict[Value, int]) -> str:
     blocks, number = file.graph.contacts.blocks, file.graph.contacts.directions.index(direction)
     block = next(i for i, block in enumerate(blocks) if number in block)
-    is_plain = len(direction.row) == 1 and not direction.rest.leaves
-    return f"{{{states[direction.own]}, {str(is_plain).lower()}, {block}}},"
+    is_plain = str(_is_plain(direction)).lower()
+    return f"{{{states[direction.own]}, {is_plain}, {block}}},"
+
+
+def _is_plain(direction: Direction) -> bool:
+    """Return whether a velocity is a multiple of a state."""
+    return len(direction.row) == 1 and not direction.rest.leaves
 
 
 def _measure(file: ModelFile, leaves: Leaves) -> list[str]:

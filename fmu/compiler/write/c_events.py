@@ -9,20 +9,19 @@ import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial, reduce
 
 from ..expressions.expression import in_order
 from ..expressions.kinds import CONDITION, WHOLE, Kind
-from ..graph.graph import CONDITIONS, MOVING, Graph, Relation, Value, is_unknown
+from ..graph.graph import CONDITIONS, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
 from ..plain_c.values import Conditions
-from ..read.content import CALCULATED, COUNTS, SWITCHES, Change, ModelFile, Sampler
+from ..read.content import CALCULATED, COUNTS, OPTIONS, SWITCHES, Change, ModelFile, Sampler
 from ..units import Exponents
-from . import c_contacts, c_undefined
+from . import c_contacts, c_indicators, c_possible, c_undefined
 from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
-from .statements import Block, Operand, Place, Statement, field_of, store
+from .statements import Block, Item, Operand, Place, Statement, field_of, store
 
 Guards = dict[Value, Value | None]  # conditions; None: always
 
@@ -293,13 +292,12 @@ class Events:
             switches=self._switches(),
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located) + len(self.limits),
-            are_possible=self._are_possible(),
             **c_contacts.parts(file, self.leaves, self._compare_limits()),
             next_time=NEXT_TIME if timed or file.sampled else [],
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
-            **self._rest(),
+            **c_possible.parts(self),
             indicators=searched.assign(indicators).lines(),
             **self._is_known(),
             compare=self._compare(),
@@ -311,7 +309,7 @@ class Events:
                 for line in self._change(i, change)
             ],
             **c_undefined.parts(file, self.leaves, in_domain),
-            descriptions=self._describe(),
+            descriptions=c_indicators.describe(self),
             names=", ".join(
                 [text(file.relation_texts[places[r.name]][:100]) for r in self.located]
                 + [text(f"{limit.contact}.{limit.key}") for limit in self.limits]
@@ -367,33 +365,6 @@ class Events:
             "end": [".has_ended = has_ended,"],
         }
 
-    def _rest(self) -> dict[str, list[str]]:
-        """When all states rest: where the conditions hold that make each rate 0.
-
-        Then nothing is integrated, and no event is located that the time leads to.
-        """
-        conditions, zero = [], self.graph.number(0.0)
-        held = c_contacts.held_states(self.file)
-        for state in self.file.of("states"):
-            rate = state.value
-            if rate.op == "if" and rate.arguments[1] is zero and not rate.arguments[0].moves:
-                conditions.append(rate.arguments[0])
-            elif rate in held:
-                conditions.append(held[rate])
-            elif rate is not zero:
-                conditions = []
-                break
-        is_of_time = any(("time", "") in distance.leaves for distance in self.followed)
-        if not conditions or (self.located and not self.limits) or is_of_time:
-            return {"rest": [], "is_at_rest": []}
-        code = Code(self.leaves)
-        rests = code.of(reduce(partial(self.graph.value, "and"), dict.fromkeys(conditions)))
-        code.statements.append(Statement(("return ", ("!=", rests, 0), ";")))
-        head = ["static bool is_at_rest(const void *values_pointer) {"]
-        head += ["    const struct equations_values *values = values_pointer;"]
-        rest = [*head, *indented(code.lines()), "}", ""]
-        return {"rest": rest, "is_at_rest": [".is_at_rest = is_at_rest,"]}
-
     def _comparing(self) -> tuple[Code, Errors, dict[Value, Value]]:
         """Return code that compares, errors of its values, and what moves with its rates."""
         graph, states, inputs = self.graph, self.file.of("states"), self.file.of("inputs")
@@ -413,17 +384,46 @@ class Events:
         return code, Errors(graph, code, given), motion
 
     def _compare(self) -> list[str]:
+        """Return statements that compare relations, of which parameters may leave some out."""
+        groups: dict[Value | None, list[int]] = {}
+        for k, relation in enumerate(self.relations):
+            groups.setdefault(self._of_parameters(self.used[relation.name]), []).append(k)
+        whole = Code(self.leaves)
+        for condition, places in groups.items():
+            items = self._compared(places)
+            if condition is not None:
+                none = {"distance": 0.0, "slope": 0.0, "noise": 1.0, "used": "0"}
+                unused = [store(Place("compared[", k, f"].{key}"), of)
+                          for k in places for key, of in none.items()]  # fmt: skip
+                items = [Block(whole.of(condition), (items, unused))]
+            whole.statements += items
+        return whole.lines()
+
+    def _of_parameters(self, guard: Value | None) -> Value | None:
+        """Return what parameters that have few values say about a condition; None: nothing."""
+        if guard is None:
+            return None
+        names = {variable.name for variable in self.file.of(OPTIONS)}
+        if guard.leaves and {name for _, name in guard.leaves} <= names:
+            return guard
+        if guard.op not in ("and", "or"):
+            return None
+        parts = [*map(self._of_parameters, guard.arguments)]
+        if None in parts:
+            return None if guard.op == "or" else next((x for x in parts if x is not None), None)
+        return parts[0] if parts[0] is parts[1] else self.graph.value(guard.op, *parts)
+
+    def _compared(self, places: Iterable[int]) -> list[Item]:
         code, errors, motion = self._comparing()
         stores = []
-        for k, relation in enumerate(self.relations):
+        for k, relation in ((k, self.relations[k]) for k in places):
             distance, used = relation.distance, self.used[relation.name]
             error = errors.of(distance) if relation.time is None else NONE
             (slope,) = self.graph.derivatives([distance], motion)
             found = {"distance": code.of(distance), "slope": code.of(slope), "noise": error}
             found["used"] = "1" if used is None else code.of(used)
             stores += [store(Place("compared[", k, f"].{key}"), of) for key, of in found.items()]
-        code.statements += stores
-        return code.lines()
+        return [*code.statements, *stores]
 
     def _compare_limits(self) -> list[str]:
         code, errors, motion = self._comparing()
@@ -434,14 +434,20 @@ class Events:
 
     def _due(self) -> list[str]:
         """Return whether each event of the file is due."""
-        code, stores = Code(self.leaves), []
-        for i, event in enumerate(self.file.events):
-            found = code.of(event.when.value)
-            if event.during is not None:
-                found = "and", found, code.of(event.during.value)
-            stores.append(store(Place("due[", i, "]"), found))
-        code.statements += stores
+        code = Code(self.leaves)
+        found = enumerate(self.dues(code))
+        code.statements += [store(Place("due[", i, "]"), due) for i, due in found]
         return code.lines()
+
+    def dues(self, code: Code) -> list[Operand]:
+        """Return the operand of each event's condition."""
+        found = []
+        for event in self.file.events:
+            due = code.of(event.when.value)
+            if event.during is not None:
+                due = "and", due, code.of(event.during.value)
+            found.append(due)
+        return found
 
     def _segments(self, places: Mapping[str, int]) -> dict[str, object]:
         segments, code = self.graph.segments.values(), Code(self.leaves)
@@ -537,54 +543,6 @@ class Events:
                 bounds = f"1, {len(kind)}" if is_item else "0, 1"
             rows.append(f"{{{text(name)}, {bounds}}},")
         return rows
-
-    def _describe(self) -> list[str]:
-        code, stores, one = Code(self.leaves), [], self.graph.number(1.0)
-        for i, relation in enumerate(self.located):
-            found, used = self._described(code, relation), self.used[relation.name]
-            if used is not None:
-                found = "if", code.of(used), found, "unused"
-            stores.append(store(Place("indicator[", i, "]"), found))
-        for i, limit in enumerate(self.limits, len(self.located)):
-            condition, *cases = limit.cases
-            first, second = (self._described(code, Relation(x, True, None, None, one))
-                             for x in cases)  # fmt: skip
-            found = second if condition is None else ("if", code.of(condition), first, second)
-            if limit.used is not None:
-                found = "if", code.of(limit.used), found, "unused"
-            stores.append(store(Place("indicator[", i, "]"), found))
-        code.statements += stores
-        return code.lines()
-
-    def _are_possible(self) -> list[str]:
-        """Whether there are relations that are read in these modes, or contacts that may hold."""
-        used = [contact.active for contact in self.graph.contacts.contacts] if self.limits else []
-        used += [self.used[relation.name] for relation in self.located]
-        if not used or any(x is None or x.moves for x in used):
-            return [f"return {str(bool(used)).lower()};"]
-        code = Code(self.leaves)
-        holds = code.of(reduce(partial(self.graph.value, "or"), dict.fromkeys(used)))
-        code.statements.append(Statement(("return ", ("!=", holds, 0), ";")))
-        head = "const struct equations_values *values = values_pointer;"
-        return [head, *code.lines()]
-
-    def _described(self, code: Code, relation: Relation) -> Operand:
-        """How an indicator follows from the states: from one by a factor, if it can be."""
-        distance, zero = relation.distance, self.graph.number(0.0)
-        moving = [leaf for leaf in distance.leaves if leaf[0] in MOVING]
-        if len(moving) == 1 and moving[0][0] == "state":
-            place, x = next(
-                (i, x) for i, x in enumerate(self.file.of("states")) if x.name == moving[0][1]
-            )
-            factor = self.graph.derivative(distance, x.leaf)
-            if not factor.moves:
-                rate = zero if ("time", "") in x.value.leaves else x.value  # unknown here
-                at_zero = Code(code.leaves.but({moving[0]: 0.0}))
-                at_zero.statements = code.statements  # which have its constants, too
-                offset = at_zero.of(distance)
-                holds, factor, rate = (code.of(v) for v in (relation.mode, factor, rate))
-                return "relations_state_indicator", place, holds, factor, offset, rate
-        return "relations_model_indicator", code.of(relation.limit or zero)
 
 
 def _every_name(sampler: Sampler) -> str:

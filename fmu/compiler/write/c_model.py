@@ -6,11 +6,12 @@ from typing import Any
 from ..expressions.expression import RELATIONS, in_order
 from ..expressions.kinds import CONDITION
 from ..graph.band import band
+from ..graph.contacts import REACHED
 from ..graph.curve import Curve
 from ..graph.graph import FALLIBLE, Value, is_number
 from ..names import Field
 from ..read.content import CALCULATED, OPTIONS, ModelFile
-from . import c_algebraic, c_hook, c_undefined
+from . import c_algebraic, c_hook, c_indicators, c_undefined
 from .c_code import Code, of_both, told
 from .c_events import Events, arrays, count, leaves, ticks
 from .c_series import Series
@@ -217,14 +218,14 @@ def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list
     rates = {state.leaf: state.value for state in file.of("states")}
     if file.hook:
         return rates, [file.variables[name].value for name in file.hook.series]
-    return rates, events.followed
+    return rates, [*c_indicators.in_series(events)]
 
 
 def _has_kinks(followed: tuple[dict[Value, Value], list[Value]]) -> bool:
     """Return whether a value that C compares decides on a rate or distance, without an event."""
     rates, distances = followed
     nodes = in_order([*rates.values(), *distances])
-    return any(v.op in RELATIONS and v.moves for v in nodes)
+    return any(v.op in RELATIONS and v.moves and v.name != REACHED for v in nodes)
 
 
 def _series(file: ModelFile, series: Series, has_domains: bool) -> dict[str, object]:

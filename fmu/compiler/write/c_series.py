@@ -15,6 +15,7 @@ from itertools import groupby
 from ..expressions.expression import in_order
 from ..graph import algebraic
 from ..graph.coefficients import read_in_series, with_partials
+from ..graph.contacts import REACHED
 from ..graph.graph import (
     CONDITIONS,
     DERIVATIVES,
@@ -209,7 +210,8 @@ class Series:
         if self.is_limited:
             return []
         values = (value for value in self.columns or self.rows)
-        return [(value, argument) for value in values for argument in self._arguments(value)]
+        inner = (value for value in values if value.name != REACHED)
+        return [(value, argument) for value in inner for argument in self._arguments(value)]
 
     @property
     def may_vanish(self) -> bool:
