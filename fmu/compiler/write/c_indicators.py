@@ -48,7 +48,7 @@ def describe(events: Events) -> list[str]:
         condition, *cases = limit.cases
         first, second = (_described(events, code, Relation(x, True, None, None, one))
                          for x in cases)  # fmt: skip
-        if limit.most is not None:
+        if limit.most is not None and not limit.most.moves:
             first = "relations_force_indicator", code.of(limit.most)
             second = first if cases[0] is cases[1] else second
         found = second if condition is None else ("if", code.of(condition), first, second)
