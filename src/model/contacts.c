@@ -32,25 +32,31 @@ struct work {
 
 static struct contacts_measured measured_in(const struct contacts *model, double *room) {
     const int directions = model->direction_count, contacts = model->contact_count;
-    struct contacts_measured to;
-    double **const of_directions[] = {&to.velocity, &to.size,   &to.slack,
-                                      &to.rest,     &to.factor, &to.acceleration};
-    double **const of_contacts[] = {
-        &to.active,   &to.ratio,       &to.law,       &to.coulomb, &to.breakaway,
-        &to.stribeck, &to.position,    &to.lower,     &to.upper,   &to.at_lower,
-        &to.at_upper, &to.restitution, &to.tolerance,
+    double *of_contacts = room + 6 * directions;
+    double *others = of_contacts + 13 * contacts;
+    return (struct contacts_measured){
+        .velocity = room,
+        .size = room + directions,
+        .rest = room + 2 * directions,
+        .factor = room + 3 * directions,
+        .acceleration = room + 4 * directions,
+        .slack = room + 5 * directions,
+        .active = of_contacts,
+        .ratio = of_contacts + contacts,
+        .law = of_contacts + 2 * contacts,
+        .coulomb = of_contacts + 3 * contacts,
+        .breakaway = of_contacts + 4 * contacts,
+        .stribeck = of_contacts + 5 * contacts,
+        .position = of_contacts + 6 * contacts,
+        .lower = of_contacts + 7 * contacts,
+        .upper = of_contacts + 8 * contacts,
+        .at_lower = of_contacts + 9 * contacts,
+        .at_upper = of_contacts + 10 * contacts,
+        .restitution = of_contacts + 11 * contacts,
+        .tolerance = of_contacts + 12 * contacts,
+        .response = others,
+        .jump = others + directions * contacts,
     };
-    for (size_t i = 0; i < sizeof of_directions / sizeof *of_directions; i++) {
-        *of_directions[i] = room;
-        room += directions;
-    }
-    for (size_t i = 0; i < sizeof of_contacts / sizeof *of_contacts; i++) {
-        *of_contacts[i] = room;
-        room += contacts;
-    }
-    to.response = room;
-    to.jump = room + directions * contacts;
-    return to;
 }
 
 static void measure(struct work *work) {

@@ -22,7 +22,7 @@ static double *discrete_of(const struct call *call) {
 static void update_timed_modes(const struct call *call) {
     const struct relations *model = call->model;
     model->write_times(call->values, call->room.times);
-    for (int k = 0; k < model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         const struct relation *relation = &model->relation[k];
         if (relation->is_timed) {
             call->holds[k] = (call->room.times[k] <= call->passed) == relation->rises;
@@ -145,7 +145,7 @@ static bool follow_change(const struct call *call) {
     modes_switch_fallen(call);
     allow_rounding(call, false);
     changes |= modes_settle(call);
-    for (int k = 0; k < call->model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         changes |= call->room.turned[k] != 0;
     }
     modes_clear_turned(call);
@@ -270,7 +270,7 @@ static bool joins(const struct compared *compared, int holds) {
 /* Puts relations in circles back over their limits, if distances in the modes behind them have
  * taken all of them back: an unknown may meet its limit within its error before the states do. */
 static void insist(const struct call *call) {
-    const int count = call->model->relation_count;
+    const int count = call->relation_count;
     int *turned = call->room.turned;
     bool is_back = call->model->is_circular != NULL;
     bool is_any = false;
@@ -296,7 +296,7 @@ static void pass(const struct call *call, const struct event *event) {
     const struct relations_room room = call->room;
     modes_compare(call, room.tolerance, room.compared);
     update_timed_modes(call);
-    for (int k = 0; k < model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         const struct relation *relation = &model->relation[k];
         if (!relation->is_timed && event->triggered != NULL) {
             // if a state is at its limit within its error, its indicator may only seem to fall
@@ -359,7 +359,7 @@ static enum status follow_contacts(const struct call *call, const struct event *
                                    bool is_first, bool is_start, bool *changes) {
     enum { MOST_ROUNDS = 20 };
     const struct relations *model = call->model;
-    const bool is_read = model->relation_count > 0 || model->segment_count > 0;
+    const bool is_read = call->relation_count > 0 || model->segment_count > 0;
     enum status status = STATUS_OK;
     bool differs = model->contacts != NULL;
     for (int count = 0; differs && status == STATUS_OK && count < MOST_ROUNDS; count++) {

@@ -91,6 +91,9 @@ struct relations {
     int assignment_count;
     const struct contacts *contacts; /* NULL: none */
 
+    /* False if parameters switch off all that reads relations. NULL if they cannot. */
+    bool (*are_read)(const void *values);
+
     /* Writes the start values of modes, and of states and discrete variables that follow from
      * parameters. NULL if there are none. */
     void (*start)(void *values);

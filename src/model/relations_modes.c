@@ -10,9 +10,21 @@ struct call modes_call(const struct relations *model, struct relations_room room
     int *modes = (int *)(void *)((char *)values + model->modes.offset);
     int *holds = modes + 1;
     int *active = holds + model->relation_count;
+    const bool are_read = *modes == 0 || model->are_read == NULL || model->are_read(values);
     return (struct call){
-        model, room, values, modes, holds,         active, active + model->event_count + 1,
-        t,     0.0,  t,      du,    largest_inputs};
+        .model = model,
+        .room = room,
+        .values = values,
+        .is_begun = modes,
+        .holds = holds,
+        .active = active,
+        .segments = active + model->event_count + 1,
+        .relation_count = are_read ? model->relation_count : 0,
+        .t = t,
+        .passed = t,
+        .du = du,
+        .largest_inputs = largest_inputs,
+    };
 }
 
 static struct given given_in(const struct call *call, bool is_free, const double state_errors[]) {
@@ -94,7 +106,7 @@ static bool update_modes(const struct call *call, bool is_exact) {
     struct compared *compared = call->room.compared;
     bool changes = false;
     modes_compare(call, call->room.tolerance, compared);
-    for (int k = 0; k < call->model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         const int holds = modes_hold_at(&relation[k], compared[k].distance);
         const bool follows =
             is_exact || (modes_sure(&compared[k]) && !(call->room.turned[k] & TURNED));
@@ -112,7 +124,7 @@ static bool update_modes(const struct call *call, bool is_exact) {
 static bool update_first_mode(const struct call *call, bool is_exact) {
     const struct compared *compared = call->room.compared;
     modes_compare(call, call->room.tolerance, call->room.compared);
-    for (int k = 0; k < call->model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         const int holds = modes_hold_at(&call->model->relation[k], compared[k].distance);
         const bool follows =
             is_exact || (modes_sure(&compared[k]) && !(call->room.turned[k] & TURNED));
@@ -130,10 +142,10 @@ static bool update_first_mode(const struct call *call, bool is_exact) {
 static void follow_solutions(const struct call *call) {
     const struct relations *model = call->model;
     bool changes = model->is_circular != NULL;
-    for (int count = 0; changes && count < model->relation_count; count++) {
+    for (int count = 0; changes && count < call->relation_count; count++) {
         changes = false;
         compare_in(call, true, call->room.zeros, call->room.compared);
-        for (int k = 0; k < model->relation_count; k++) {
+        for (int k = 0; k < call->relation_count; k++) {
             const int holds = modes_hold_at(&model->relation[k], call->room.compared[k].distance);
             const bool turns =
                 model->is_circular[k] && !is_unsolved(call, k) && call->holds[k] != holds;
@@ -142,7 +154,7 @@ static void follow_solutions(const struct call *call) {
             changes |= turns;
         }
         modes_compare(call, call->room.tolerance, call->room.compared);
-        for (int k = 0; k < model->relation_count; k++) {
+        for (int k = 0; k < call->relation_count; k++) {
             const struct compared *compared = &call->room.compared[k];
             const bool turns = (call->room.turned[k] & FOLLOWS) != 0;
             call->holds[k] ^=
@@ -155,7 +167,7 @@ static void follow_solutions(const struct call *call) {
 /* True if a value that is needed follows from a solution that is not known. */
 static bool lacks_solution(const struct call *call) {
     bool found = false;
-    for (int k = 0; call->model->is_circular != NULL && k < call->model->relation_count; k++) {
+    for (int k = 0; call->model->is_circular != NULL && k < call->relation_count; k++) {
         found |= is_unsolved(call, k) && call->room.compared[k].used;
     }
     return found;
@@ -167,7 +179,7 @@ static bool lacks_solution(const struct call *call) {
 enum { ROUNDS_IN_CIRCLES = 20 };
 
 bool modes_update(const struct call *call, bool is_exact) {
-    const int relations = call->model->relation_count;
+    const int relations = call->relation_count;
     bool changes = true;
     bool is_any = false;
     for (int count = 0; changes && count < relations; count++) {
@@ -198,7 +210,7 @@ static bool is_contradicted(const struct call *call, int k) {
 
 int modes_contradiction(const struct call *call) {
     const bool *is_circular = call->model->is_circular;
-    for (int k = 0; is_circular != NULL && k < call->model->relation_count; k++) {
+    for (int k = 0; is_circular != NULL && k < call->relation_count; k++) {
         if (!is_circular[k] || !is_contradicted(call, k)) {
             continue;
         }
@@ -219,14 +231,14 @@ static bool pass_by_time(const struct call *call) {
     const struct compared *compared = call->room.compared;
     bool changes = false;
     bool is_any = false;
-    for (int k = 0; k < call->model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         is_any |= relation[k].is_of_time && !relation[k].is_timed;
     }
     if (!is_any) {
         return false;
     }
     modes_compare(call, call->room.zeros, call->room.compared);
-    for (int k = 0; k < call->model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         const bool passes = relation[k].is_of_time && !relation[k].is_timed &&
                             modes_near(&compared[k]) && compared[k].slope != 0.0;
         const int holds = compared[k].slope > 0.0;
@@ -238,7 +250,7 @@ static bool pass_by_time(const struct call *call) {
 
 bool modes_settle(const struct call *call) {
     bool changes = modes_update(call, false);
-    for (int count = 0; count < call->model->relation_count && pass_by_time(call); count++) {
+    for (int count = 0; count < call->relation_count && pass_by_time(call); count++) {
         (void)modes_update(call, false);
         changes = true;
     }
@@ -259,7 +271,7 @@ static bool set_modes_from_values(const struct call *call, bool only_of_inputs) 
         }
     }
     modes_compare(call, call->room.zeros, call->room.compared);
-    for (int k = 0; k < model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         if (model->relation[k].is_of_inputs || !only_of_inputs) {
             const int holds = modes_hold_at(&model->relation[k], compared[k].distance);
             changes |= call->holds[k] != holds;
@@ -270,7 +282,7 @@ static bool set_modes_from_values(const struct call *call, bool only_of_inputs) 
 }
 
 void modes_follow_inputs(const struct call *call) {
-    for (int count = 0; set_modes_from_values(call, true) && count < call->model->relation_count;
+    for (int count = 0; set_modes_from_values(call, true) && count < call->relation_count;
          count++) {
     }
 }
@@ -286,7 +298,7 @@ void modes_switch_fallen(const struct call *call) {
     const struct compared *before = call->room.before;
     struct compared *after = call->room.compared;
     modes_compare(call, call->room.tolerance, after);
-    for (int k = 0; k < model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         const double slope = modes_slope(&after[k], call->holds[k]);
         const bool falls = slope < 0.0 && slope < modes_slope(&before[k], call->holds[k]);
         const bool may_turn = !model->relation[k].is_timed && modes_near(&after[k]);
@@ -294,7 +306,7 @@ void modes_switch_fallen(const struct call *call) {
         call->holds[k] ^= may_turn && falls;
     }
     modes_compare(call, call->room.zeros, after);
-    for (int k = 0; k < model->relation_count; k++) {
+    for (int k = 0; k < call->relation_count; k++) {
         const bool is_new = !before[k].used || modes_slope(&before[k], call->holds[k]) > 0.0;
         const bool rests = is_new && fabs(after[k].slope) * rest_time <= after[k].noise;
         if (!model->relation[k].is_timed && modes_near(&after[k]) && rests) {
@@ -305,5 +317,5 @@ void modes_switch_fallen(const struct call *call) {
 }
 
 void modes_clear_turned(const struct call *call) {
-    memset(call->room.turned, 0, (size_t)call->model->relation_count * sizeof *call->room.turned);
+    memset(call->room.turned, 0, (size_t)call->relation_count * sizeof *call->room.turned);
 }

@@ -13,6 +13,7 @@ struct call {
     struct relations_room room;
     void *values;
     int *is_begun, *holds, *active, *segments; /* parts of its modes */
+    int relation_count;                        /* 0 if no relation is read */
     double t;                                  /* s */
     double error;                              /* of t, s */
     double passed;                /* s: earlier time events, and those at this time, are past */

@@ -385,11 +385,8 @@ class Events:
 
     def _compare(self) -> list[str]:
         """Return statements that compare relations, of which parameters may leave some out."""
-        groups: dict[Value | None, list[int]] = {}
-        for k, relation in enumerate(self.relations):
-            groups.setdefault(self._of_parameters(self.used[relation.name]), []).append(k)
         whole = Code(self.leaves)
-        for condition, places in groups.items():
+        for condition, places in self.read_by().items():
             items = self._compared(places)
             if condition is not None:
                 none = {"distance": 0.0, "slope": 0.0, "noise": 1.0, "used": "0"}
@@ -398,6 +395,13 @@ class Events:
                 items = [Block(whole.of(condition), (items, unused))]
             whole.statements += items
         return whole.lines()
+
+    def read_by(self) -> dict[Value | None, list[int]]:
+        """Return relations by conditions of parameters without which nothing reads them."""
+        found: dict[Value | None, list[int]] = {}
+        for k, relation in enumerate(self.relations):
+            found.setdefault(self._of_parameters(self.used[relation.name]), []).append(k)
+        return found
 
     def _of_parameters(self, guard: Value | None) -> Value | None:
         """Return what parameters that have few values say about a condition; None: nothing."""

@@ -36,6 +36,12 @@ def in_series(events: Events) -> Iterator[Value]:
         yield where(limit.used, found, zero)
 
 
+def first_of_model(events: Events) -> int:
+    """Return the place of the first indicator that no single state gives: others are finite."""
+    of_state = [_state_of(events, relation.distance) is not None for relation in events.located]
+    return [*of_state, False].index(False)
+
+
 def describe(events: Events) -> list[str]:
     """Return statements that write the kind of each indicator."""
     code, stores, one = Code(events.leaves), [], events.graph.number(1.0)

@@ -297,6 +297,7 @@ def _domains(
         solutions=_solutions(series, ".solution"),
         anchors=c_algebraic.anchors(file),
         jacobian_size=jacobian_size,
+        first_of_model=c_indicators.first_of_model(events),
         located=len(events.located) + len(events.limits),
     )
     declared = [

@@ -21,7 +21,23 @@ HEAD = "    const struct equations_values *values = values_pointer;"
 def parts(events: Events) -> dict[str, list[str]]:
     """Return the functions and where the struct has them."""
     found = {"are_possible": _are_possible(events)}
+    found |= _are_read(events)
     return found | _rest(events) | _moves_on(events) | _reach(events)
+
+
+def _are_read(events: Events) -> dict[str, list[str]]:
+    """Whether parameters let anything read relations."""
+    conditions = [*events.read_by()]
+    if not conditions or None in conditions or events.graph.segments:
+        return {"are_read": [], "of_are_read": []}
+    code = Code(events.leaves)
+    are_read = code.of(reduce(partial(events.graph.value, "or"), conditions))
+    code.statements.append(Statement(("return ", ("!=", are_read, 0), ";")))
+    lines = ["static bool are_read(const void *values_pointer) {"]
+    return {
+        "are_read": [*lines, HEAD, *indented(code.lines()), "}", ""],
+        "of_are_read": [".are_read = are_read,"],
+    }
 
 
 def _are_possible(events: Events) -> list[str]:
