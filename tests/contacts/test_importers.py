@@ -1,10 +1,12 @@
 """Friction and stops as importers run them: snapshots, event mode, Model Exchange."""
 
+import ctypes
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.fmi2 import FMU2Model
 
 from tests.equations.hybrid_runs import Run, Unit, co_simulation, early_return, model_exchange
 
@@ -62,3 +64,36 @@ def test_model_exchange_moves_alike(unit: Callable, name: str) -> None:
     outside = model_exchange(unit(name), 1e-9, step, COUNT, {})
     assert outside.differences == []
     agree(outside, inside, 1e-5)
+
+
+@EACH
+def test_directional_derivatives_are_those_of_the_modes(unit: Callable, name: str) -> None:
+    """Against central differences in Model Exchange, where modes stay between events."""
+    fmu = unit(name).instance(FMU2Model)
+    fmu.instantiate()
+    fmu.setupExperiment()
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    while fmu.newDiscreteStates()[0]:
+        pass
+    fmu.enterContinuousTimeMode()
+    count = len(unit(name).states)
+    states = unit(name).of(*unit(name).states)
+    rates = unit(name).of(
+        *(f"der_{x}" for x in unit(name).states if f"der_{x}" in unit(name).references)
+    )
+    forces = unit(name).of(*(x for x in unit(name).references if x.endswith(".force")))
+    x, h = np.array(fmu.getReal(states)), 1e-6
+
+    def at(shift: np.ndarray) -> np.ndarray:
+        values = (ctypes.c_double * count)(*(x + shift))
+        fmu.setContinuousStates(values, count)
+        return np.array(fmu.getReal([*rates, *forces]))
+
+    for i in range(count):
+        e = h * np.eye(count)[i]
+        quotient = (at(e) - at(-e)) / (2 * h)
+        at(0 * e)
+        found = fmu.getDirectionalDerivative([*rates, *forces], [states[i]], [1.0])
+        assert found == pytest.approx(quotient, abs=1e-7 * (1 + np.abs(quotient).max()))
+    fmu.freeInstance()
