@@ -15,7 +15,6 @@ from itertools import groupby
 from ..expressions.expression import in_order
 from ..graph import algebraic
 from ..graph.coefficients import read_in_series, with_partials
-from ..graph.contacts import REACHED
 from ..graph.graph import (
     CONDITIONS,
     DERIVATIVES,
@@ -25,6 +24,7 @@ from ..graph.graph import (
     Value,
     unsigned,
 )
+from ..graph.stribeck import REACHED
 from ..plain_c.values import Conditions
 from .blocks import Blocks
 from .branches import AtOrigin, OfOrder, Opened, plan_with_partials, within
