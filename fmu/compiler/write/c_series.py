@@ -625,10 +625,10 @@ def _zeros(root: Value) -> int:
     orders: dict[Value, int] = {}
     for value in in_order([root]):
         below = [orders[argument] for argument in value.arguments]
-        if value.op == "*":
-            orders[value] = sum(below)
-        elif value.op == "/":
-            orders[value] = below[0]
+        if value.op in CONDITIONS or value.name == REACHED:
+            orders[value] = 0
+        elif value.op in ("*", "/"):
+            orders[value] = sum(below[: 1 + (value.op == "*")])
         elif value.op == "pow":
             orders[value] = VANISHING * below[0]
         else:
