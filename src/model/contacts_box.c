@@ -1,10 +1,14 @@
 #include "algebraic.h"
 #include "contacts.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 enum { MOST = CONTACTS_MOST_COUPLED };
+
+/* What is beyond its bound by rounding, over its size, stays: its limit is looked at apart. */
+static const double rounding = 64.0 * DBL_EPSILON;
 
 /* Writes T and a where `leaves` says which stay, by the linear equations of those. */
 static void solve_pattern(const struct box *box, struct box_solution *to) {
@@ -55,7 +59,8 @@ static double violation(const struct box *box, const struct box_solution *at, in
         const double over = high > low ? high : low;
         const double bound = high > low ? box->high[i] : box->low[i];
         const double scale = fabs(at->T[i]) + (isfinite(bound) ? fabs(bound) : 0.0);
-        return isnan(at->T[i]) ? INFINITY : scale > 0.0 ? over / scale : over;
+        const double relative = scale > 0.0 ? over / scale : over;
+        return isnan(at->T[i]) ? INFINITY : relative > 0.0 && relative <= rounding ? 0.0 : relative;
     }
     if (!isfinite(at->T[i]) || at->a[i] == 0.0) {
         return INFINITY; // what leaves without an acceleration stays
@@ -106,9 +111,8 @@ static void solve_one(const struct box *box, struct box_solution *to) {
     to->leaves[0] = 0;
     to->T[0] = -box->a0[0] / box->W[0][0];
     to->a[0] = 0.0;
-    if (to->T[0] >= box->low[0] && to->T[0] <= box->high[0]) {
-        to->misfit = 0.0;
-    } else {
+    to->misfit = violation(box, to, 0);
+    if (!(to->misfit <= 0.0)) {
         look_at_all(box, to);
     }
 }

@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import partial, reduce
 from typing import TYPE_CHECKING
 
-from . import algebraic
+from . import algebraic, stribeck
 from .algebraic import replaced
 from .held import Held
 from .samples import are_equal, exact
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
 BACKWARD, STUCK, FORWARD = 1, 2, 3  # modes of friction
 FREE, LOWER, UPPER = 1, 2, 3  # modes of stops
-REACHED = "reached"  # name of what steps cannot hide: reach of struct model_events
-# square of a velocity in scales of the fall, and ratio up to which rounding leaves nothing there
-FAST, MOST_FALL = 49.0, 1e5
 MOST_COUPLED = 8  # src/model/contacts.h
 STILL = ("parameter", "integer", "mode", "discrete")  # leaves of factors
 OF_OFFSETS = (*STILL, "time")
@@ -41,7 +38,7 @@ class Contact:
     mode: Value
     given: dict[str, Value]
     active: Value | None = None  # None: always
-    law: Value | None = None  # size of friction that slides
+    law: Value | None = None  # size of friction that slides, by its velocity alone
     ratio: Value | None = None  # of its velocity to that of its direction
     place: tuple[Value, Value] | None = None  # of stops: state that a limit sets, its factor
     tolerances: dict[Value, Value] = field(default_factory=dict)  # factors of states in it
@@ -123,7 +120,7 @@ class Builder:
             for key in contact.given:
                 self._check_reads(contact, key)
             contact.active = self._active(contact)
-            contact.law = self._law(contact) if contact.is_friction else None
+            contact.law = self._law(contact, False) if contact.is_friction else None
         for contact in sorted(self.contacts, key=lambda c: not c.is_friction):
             self._add(contact, self._row(contact, "velocity", contact.given["velocity"]))
         self._check_independence()
@@ -295,31 +292,16 @@ class Builder:
 
     def sliding(self, contact: Contact) -> Value:
         """Return friction of what slides, against its velocity: with its sign."""
-        return self.choice(
-            self._is(contact, BACKWARD), self.graph.negative(contact.law), contact.law
-        )
+        law = self._law(contact, True)
+        return self.choice(self._is(contact, BACKWARD), self.graph.negative(law), law)
 
-    def _law(self, contact: Contact) -> Value:
-        """Return the size of sliding friction: c + (b - c) exp(-(v / v_s)^2)."""
-        graph, given = self.graph, contact.given
-        if "breakaway" not in given:
-            size = given["coulomb"]
-        else:
-            coulomb, breakaway = given["coulomb"], given["breakaway"]
-            w = graph.value("/", given["velocity"], given["stribeck"])
-            square = graph.value("*", w, w)
-            e = graph.value("exp", graph.value("negative", square), name=REACHED)
-            at_rest = graph.value("*", breakaway, e)
-            slides = graph.value("*", coulomb, graph.value("-", self.one, e))
-            most = graph.value("*", graph.number(MOST_FALL), coulomb)
-            is_fast = graph.value(">", square, graph.number(FAST), name=REACHED)
-            has_fallen = graph.value("and", is_fast, graph.value("<", breakaway, most))
-            size = self.choice(
-                graph.value(">", given["stribeck"], self.zero),
-                self.choice(has_fallen, coulomb, graph.value("+", at_rest, slides)),
-                coulomb,
-            )
-        return size if contact.active is None else self.choice(contact.active, size, self.zero)
+    def _law(self, contact: Contact, is_in_mode: bool) -> Value:
+        """Return the size of sliding friction: in the sense of its mode, or of its velocity."""
+        found = contact.given["coulomb"]
+        if "breakaway" in contact.given:
+            mode = self._is(contact, BACKWARD) if is_in_mode else None
+            found = stribeck.size(self.graph, contact.given, mode)
+        return found if contact.active is None else self.choice(contact.active, found, self.zero)
 
     def build(self) -> tuple[Contacts, dict[Value, Value], dict[Value, Value], dict[Value, Value]]:
         """Return the contacts, forces in rates, forces that are shown, and rates of the states.

@@ -6,9 +6,9 @@ from typing import Any
 from ..expressions.expression import RELATIONS, in_order
 from ..expressions.kinds import CONDITION
 from ..graph.band import band
-from ..graph.contacts import REACHED
 from ..graph.curve import Curve
 from ..graph.graph import FALLIBLE, Value, is_number
+from ..graph.stribeck import REACHED
 from ..names import Field
 from ..read.content import CALCULATED, OPTIONS, ModelFile
 from . import c_algebraic, c_hook, c_indicators, c_undefined

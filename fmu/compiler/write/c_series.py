@@ -15,7 +15,6 @@ from itertools import groupby
 from ..expressions.expression import in_order
 from ..graph import algebraic
 from ..graph.coefficients import read_in_series, with_partials
-from ..graph.contacts import REACHED
 from ..graph.graph import (
     CONDITIONS,
     DERIVATIVES,
@@ -25,6 +24,7 @@ from ..graph.graph import (
     Value,
     unsigned,
 )
+from ..graph.stribeck import REACHED
 from ..plain_c.values import Conditions
 from .blocks import Blocks
 from .branches import AtOrigin, OfOrder, Opened, plan_with_partials, within
@@ -625,10 +625,10 @@ def _zeros(root: Value) -> int:
     orders: dict[Value, int] = {}
     for value in in_order([root]):
         below = [orders[argument] for argument in value.arguments]
-        if value.op == "*":
-            orders[value] = sum(below)
-        elif value.op == "/":
-            orders[value] = below[0]
+        if value.op in CONDITIONS or value.name == REACHED:
+            orders[value] = 0
+        elif value.op in ("*", "/"):
+            orders[value] = sum(below[: 1 + (value.op == "*")])
         elif value.op == "pow":
             orders[value] = VANISHING * below[0]
         else:
