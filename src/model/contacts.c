@@ -7,6 +7,7 @@
 #include <string.h>
 
 static const double rounding = 16.0 * DBL_EPSILON; // of a velocity at rest, over its terms
+static const double part_of_slack = 1e-3;          // of a velocity's tolerance, likewise
 static const double drift = 1e-10;                 // of one that is held, between events
 
 /* Arguments of all functions here, and what has been found. */
@@ -224,25 +225,10 @@ static void read_triggered(struct work *work) {
 
 /* ---- Rest and stops -------------------------------------------------------------------------- */
 
-/* Lets velocities that are 0 be 0 to the last bit: one state of each follows from the others. */
-static void rest_exactly(struct work *work, const int at_rest[]) {
-    const int count = work->model->direction_count;
-    bool changes = true;
-    for (int pass = 0; pass < count && changes; pass++) {
-        changes = false;
-        for (int k = 0; k < count; k++) {
-            const size_t own = work->model->direction[k].own;
-            if (at_rest[k] && states_of(work)[own] != work->now.rest[k]) {
-                set_state(work, own, work->now.rest[k]);
-                changes = true;
-                measure(work);
-            }
-        }
-    }
-}
-
+/* Returns up to which speed a velocity counts as 0, which has been one of several that are. */
 static double least_velocity(const struct work *work, int k) {
-    return work->model->direction[k].is_plain ? 0.0 : rounding * work->now.size[k];
+    const double least = fmax(rounding * work->now.size[k], part_of_slack * work->now.slack[k]);
+    return work->model->direction[k].is_plain ? 0.0 : least;
 }
 
 /* Finds which velocities are 0 now, of directions that something may hold. */
@@ -262,24 +248,6 @@ static bool is_held(const struct work *work, int direction) {
             contact->direction == direction && (*mode_of(work, e) == free) == contact->is_friction;
     }
     return found;
-}
-
-/* Finds which velocities are 0, where what is held may have drifted, and lets them be 0. */
-static void find_rest(struct work *work) {
-    for (int k = 0; k < work->model->direction_count; k++) {
-        const double speed = fabs(work->now.velocity[k]);
-        const int friction = work->friction[k];
-        const bool has_halted = friction >= 0 && work->hit[friction] != 0;
-        const bool may_rest = friction >= 0 || work->sense[k] != 0;
-        const double most = is_held(work, k) && !work->model->direction[k].is_plain
-                                ? drift * work->now.size[k] + work->now.slack[k]
-                                : least_velocity(work, k);
-        work->rests[k] = may_rest && (has_halted || speed <= most);
-        if (has_halted) {
-            work->hit[friction] = 0;
-        }
-    }
-    rest_exactly(work, work->rests);
 }
 
 /* Returns the stop on which a contact is, or past which. Where the position is farther from the
@@ -310,7 +278,10 @@ static void place_on_stops(struct work *work) {
             continue;
         }
         const double at = stop == STOPS_LOWER ? work->now.at_lower[e] : work->now.at_upper[e];
-        if (states_of(work)[contact->position] != at) {
+        const double limit = stop == STOPS_LOWER ? work->now.lower[e] : work->now.upper[e];
+        const bool is_off = work->model->direction[contact->direction].is_exact ||
+                            fabs(work->now.position[e] - limit) > work->now.tolerance[e];
+        if (is_off && states_of(work)[contact->position] != at) {
             set_state(work, contact->position, at);
             measure(work);
         }
@@ -412,31 +383,37 @@ static bool decide(struct work *work) {
     return fits;
 }
 
-/* ---- Impacts --------------------------------------------------------------------------------- */
+/* ---- Impulses -------------------------------------------------------------------------------- */
+
+/* Changes the states by an impulse of a contact. */
+static void push(struct work *work, int contact, double impulse) {
+    const double *x = states_of(work);
+    const int contacts = work->model->contact_count;
+    for (int i = 0; i < work->model->moved_count; i++) {
+        const size_t state = work->model->moved[i];
+        set_state(work, state, x[state] + work->now.jump[i * contacts + contact] * impulse);
+    }
+}
 
 /* Applies impulses at stops, P per direction in its sense; the velocities before are in
  * work->before. Velocities that become 0 do so to the last bit. */
 static void apply_impulses(struct work *work, const double P[], const int is_struck[],
                            const double restitution[]) {
-    const int contacts = work->model->contact_count;
-    const double *x = states_of(work);
     for (int k = 0; k < work->model->direction_count; k++) {
-        if (!is_struck[k]) {
+        if (!is_struck[k] || P[k] == 0.0) {
             continue;
         }
         const int e = work->stop[k];
         const struct contact *contact = &work->model->contact[e];
         const double impulse = P[k] / work->now.ratio[e];
-        for (int i = 0; i < work->model->moved_count; i++) {
-            const size_t state = work->model->moved[i];
-            set_state(work, state, x[state] + work->now.jump[i * contacts + e] * impulse);
-        }
+        push(work, e, impulse);
         double *of_instant = double_at(work, contact->impulse);
         *of_instant = (work->struck[e] ? *of_instant : 0.0) + impulse;
         *double_at(work, contact->impulses) += impulse;
         *double_at(work, contact->loss) -= 0.5 * P[k] * (1.0 - restitution[k]) * work->before[k];
         work->struck[e] = 1;
     }
+    measure(work);
     const int count = work->model->direction_count;
     bool are_plain = true;
     for (int k = 0; k < count; k++) {
@@ -444,7 +421,7 @@ static void apply_impulses(struct work *work, const double P[], const int is_str
     }
     for (int pass = 0; pass < (are_plain ? 1 : count); pass++) {
         for (int k = 0; k < count; k++) {
-            if (is_struck[k]) {
+            if (is_struck[k] && work->model->direction[k].is_exact) {
                 if (!are_plain) {
                     measure(work); // others may have moved where this one rests
                 }
@@ -491,6 +468,61 @@ static void solve_impulses(const struct work *work, const int is_member[], const
             P[member[i]] = found.T[i];
         }
     }
+}
+
+/* Lets velocities be 0 that are nearly so: by impulses between them, if they follow from each
+ * other; then to the last bit, where one state of each follows from the others. */
+static void rest_exactly(struct work *work) {
+    const int count = work->model->direction_count;
+    bool is_near = true;
+    for (int k = 0; k < count; k++) {
+        is_near &= !work->rests[k] || work->model->direction[k].is_exact ||
+                   fabs(work->now.velocity[k]) <= least_velocity(work, k);
+        work->acceleration[k] = -work->now.velocity[k];
+    }
+    if (!is_near) {
+        solve_impulses(work, work->rests, work->acceleration, work->hold);
+        for (int k = 0; k < count; k++) {
+            const int friction = work->friction[k];
+            if (work->rests[k] && friction >= 0) {
+                push(work, friction, -work->hold[k]);
+            } else if (work->rests[k]) {
+                push(work, work->stop[k], work->hold[k] / work->now.ratio[work->stop[k]]);
+            }
+        }
+        measure(work);
+    }
+    bool changes = true;
+    for (int pass = 0; pass < count && changes; pass++) {
+        changes = false;
+        for (int k = 0; k < count; k++) {
+            const struct direction *direction = &work->model->direction[k];
+            if (work->rests[k] && direction->is_exact &&
+                states_of(work)[direction->own] != work->now.rest[k]) {
+                set_state(work, direction->own, work->now.rest[k]);
+                changes = true;
+                measure(work);
+            }
+        }
+    }
+}
+
+/* Finds which velocities are 0, where what is held may have drifted, and lets them be 0. */
+static void find_rest(struct work *work) {
+    for (int k = 0; k < work->model->direction_count; k++) {
+        const double speed = fabs(work->now.velocity[k]);
+        const int friction = work->friction[k];
+        const bool has_halted = friction >= 0 && work->hit[friction] != 0;
+        const bool may_rest = friction >= 0 || work->sense[k] != 0;
+        const double most = is_held(work, k) && !work->model->direction[k].is_plain
+                                ? drift * work->now.size[k] + work->now.slack[k]
+                                : least_velocity(work, k);
+        work->rests[k] = may_rest && (has_halted || speed <= most);
+        if (has_halted) {
+            work->hit[friction] = 0;
+        }
+    }
+    rest_exactly(work);
 }
 
 /* Ends bouncing: what hardly leaves its stop stays, with all that rests on stops. */

@@ -33,6 +33,7 @@ struct contact {
 struct direction {
     size_t own;    /* state that follows from the others while it is held */
     bool is_plain; /* true if the velocity is a multiple of that state */
+    bool is_exact; /* true if no state that it follows from does so from it in turn */
     int block;     /* directions that are decided together have one number */
 };
 

@@ -438,7 +438,9 @@ enum status relations_update(const struct relations *model, struct relations_roo
     for (int count = 0; status == STATUS_OK && fires && count <= event->max_events; count++) {
         status = run_due_events(&call, event, count == event->max_events, &fires);
         if (status == STATUS_OK && (was_begun || fires)) {
-            status = follow_contacts(&call, event, was_begun && count == 0, false, &fires);
+            changes = false;
+            status = follow_contacts(&call, event, was_begun && count == 0, false, &changes);
+            fires |= changes && model->event_count > 0;
         }
     }
     const int wrong = status == STATUS_OK && !fires ? modes_contradiction(&call) : -1;

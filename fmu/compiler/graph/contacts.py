@@ -54,6 +54,7 @@ class Direction:
     contacts: list[Contact]
     own: Value | None = None  # state that follows from the others while it is held
     rest: Value | None = None  # what that is then
+    is_exact: bool = True  # it does not follow from others that follow from it
     held: Value | None = None
     hold: Value | None = None  # force, in the direction of the velocity
 
@@ -128,6 +129,10 @@ class Builder:
             direction.own = own
             direction.rest = self._solved_for(own, direction.row, direction.offset)
             direction.held = self._held(direction)
+        for direction in self.directions:
+            direction.is_exact = self._is_exact(direction, ())
+            for contact in direction.stops:
+                self._find_place(contact, direction)
 
     def _check_reads(self, contact: Contact, key: str) -> None:
         read = contact.given[key].leaves & self.forces.keys()
@@ -184,8 +189,6 @@ class Builder:
         else:
             contact.ratio = self.one
             self.directions.append(Direction(contact.given["velocity"], row, rest, [contact]))
-        if not contact.is_friction:
-            self._find_place(contact, row, rest)
 
     def _check_independence(self) -> None:
         """Check that no velocity follows from others, by elimination with any parameters."""
@@ -251,7 +254,14 @@ class Builder:
                 total = self._plus(total, self._times(factor, x))
         return self.over(self.graph.negative(total), row[own])
 
-    def _find_place(self, contact: Contact, row: dict[Value, Value], rest: Value) -> None:
+    def _is_exact(self, direction: Direction, above: tuple[Direction, ...]) -> bool:
+        """Return whether no other direction's own state follows from that of this one, in turn."""
+        owners = {other.own: other for other in self.directions}
+        others = [owners[x] for x in direction.row if x is not direction.own and x in owners]
+        below = (*above, direction)
+        return not any(other in below or not self._is_exact(other, below) for other in others)
+
+    def _find_place(self, contact: Contact, direction: Direction) -> None:
         """Find the state that is set where a stop is reached."""
         graph, position = self.graph, contact.given["position"]
         places, offset = self._row(contact, "position", position)
@@ -260,7 +270,7 @@ class Builder:
             raise ContactError(contact, "position", "has no velocity: a force acts on its rate")
         if not are_equal(rate, contact.given["velocity"]):
             raise ContactError(contact, "velocity", "is not the rate of position")
-        own = min(places, key=lambda x: places[x].op not in ("number", "negative"))
+        own = min(places, key=lambda x: self.rates[x] is not direction.own)
         contact.place = own, self._solved_for(own, places, offset)
         contact.tolerances = places
 

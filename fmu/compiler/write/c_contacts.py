@@ -207,7 +207,8 @@ def _direction_row(file: ModelFile, direction: Direction, states: dict[Value, in
     blocks, number = file.graph.contacts.blocks, file.graph.contacts.directions.index(direction)
     block = next(i for i, block in enumerate(blocks) if number in block)
     is_plain = str(_is_plain(direction)).lower()
-    return f"{{{states[direction.own]}, {is_plain}, {block}}},"
+    is_exact = str(direction.is_exact).lower()
+    return f"{{{states[direction.own]}, {is_plain}, {is_exact}, {block}}},"
 
 
 def _is_plain(direction: Direction) -> bool:
