@@ -67,7 +67,8 @@ def moves_on(file: ModelFile) -> Value | None:
                     both(contact.active, own), both(graph.value("not", contact.active), off)
                 )
             found.append(own)
-    return reduce(both, found)
+    value = reduce(both, found)
+    return None if ("time", "") in value.leaves else value
 
 
 def _is_stuck(graph: Graph, direction: Direction) -> Value:
@@ -86,7 +87,7 @@ def surely_held(file: ModelFile, leaves: Leaves) -> list[Item]:
     """
     found: list[Item] = []
     for direction in file.graph.contacts.directions:
-        if not direction.friction:
+        if not direction.friction or _is_stuck(file.graph, direction).op == "number":
             continue
         given, code, hold = direction.friction.given, Code(leaves), Place("hold")
         code.statements.append(Statement(("double hold;",)))

@@ -12,6 +12,7 @@ from .c_text import indented
 from .statements import Block, Place, Statement, store
 
 if TYPE_CHECKING:
+    from ..graph.graph import Value
     from .c_events import Events
 
 SLOW = 6.0  # velocity, in scales of the fall, beyond which exp(-36) of it is left
@@ -107,6 +108,11 @@ def _moves_on(events: Events) -> dict[str, list[str]]:
     }
 
 
+def _is_of_time(*values: Value) -> bool:
+    """Return whether one of them needs the time, which is not known here."""
+    return any(("time", "") in value.leaves for value in values)
+
+
 def _reach(events: Events) -> dict[str, list[str]]:
     """How far a step may go while friction slides that falls from breakaway: to see its fall.
 
@@ -118,6 +124,7 @@ def _reach(events: Events) -> dict[str, list[str]]:
         (direction, direction.friction)
         for direction in graph.contacts.directions
         if direction.friction and "breakaway" in direction.friction.given
+        and not _is_of_time(direction.friction.given["stribeck"], direction.velocity)
     ]  # fmt: skip
     if not falling:
         return {"reach": [], "of_reach": []}
@@ -128,7 +135,9 @@ def _reach(events: Events) -> dict[str, list[str]]:
     for direction, friction in falling:
         given, is_stuck = friction.given, c_contacts.is_mode(graph, friction, STUCK)
         falls = graph.value(">", given["breakaway"], given["coulomb"])
-        slides = graph.value("and", graph.value("not", is_stuck), falls)
+        slides = graph.value("not", is_stuck)
+        if not _is_of_time(falls):
+            slides = graph.value("and", slides, falls)
         if friction.active is not None:
             slides = graph.value("and", friction.active, slides)
         scale, speed = code.of(given["stribeck"]), ("fabs", code.of(given["velocity"]))
