@@ -40,4 +40,5 @@ def size(graph: Graph, given: dict[str, Value], is_backward: Value | None = None
     most = value("*", graph.number(MOST_FALL), coulomb)
     has_fallen = value("and", is_fast, value("<", breakaway, most))
     falls = value("if", has_fallen, coulomb, value("+", at_rest, slides))
-    return value("if", value(">", scale, zero), falls, coulomb)
+    may_fall = value("and", value(">", breakaway, coulomb), value(">", scale, zero))
+    return value("if", may_fall, falls, coulomb)
