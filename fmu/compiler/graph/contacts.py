@@ -121,7 +121,8 @@ class Builder:
             for key in contact.given:
                 self._check_reads(contact, key)
             contact.active = self._active(contact)
-            contact.law = self._law(contact, False) if contact.is_friction else None
+            if contact.is_friction:
+                contact.law = self._where_active(contact, self._law(contact, False))
         for contact in sorted(self.contacts, key=lambda c: not c.is_friction):
             self._add(contact, self._row(contact, "velocity", contact.given["velocity"]))
         self._check_independence()
@@ -302,8 +303,9 @@ class Builder:
 
     def sliding(self, contact: Contact) -> Value:
         """Return friction of what slides, against its velocity: with its sign."""
-        law = self._law(contact, True)
-        return self.choice(self._is(contact, BACKWARD), self.graph.negative(law), law)
+        law, backward = self._law(contact, True), self._is(contact, BACKWARD)
+        found = self.choice(backward, self.graph.negative(law), law)
+        return self._where_active(contact, found)
 
     def _law(self, contact: Contact, is_in_mode: bool) -> Value:
         """Return the size of sliding friction: in the sense of its mode, or of its velocity."""
@@ -311,7 +313,10 @@ class Builder:
         if "breakaway" in contact.given:
             mode = self._is(contact, BACKWARD) if is_in_mode else None
             found = stribeck.size(self.graph, contact.given, mode)
-        return found if contact.active is None else self.choice(contact.active, found, self.zero)
+        return found
+
+    def _where_active(self, contact: Contact, size: Value) -> Value:
+        return size if contact.active is None else self.choice(contact.active, size, self.zero)
 
     def build(self) -> tuple[Contacts, dict[Value, Value], dict[Value, Value], dict[Value, Value]]:
         """Return the contacts, forces in rates, forces that are shown, and rates of the states.

@@ -38,8 +38,9 @@ def size(graph: Graph, given: dict[str, Value], is_backward: Value | None = None
         left = value("if", compared("<", w, zero), value("+", left, back), left)
     at_rest, slides = value("*", breakaway, left), value("*", coulomb, value("-", one, left))
     most = value("*", graph.number(MOST_FALL), coulomb)
-    falls = value("+", at_rest, slides)
+    falls, may_fall = value("+", at_rest, slides), value(">", scale, zero)
     if not (coulomb.moves or breakaway.moves):
         has_fallen = value("and", is_fast, value("<", breakaway, most))
         falls = value("if", has_fallen, coulomb, falls)
-    return falls if scale.moves else value("if", value(">", scale, zero), falls, coulomb)
+        may_fall = value("and", value(">", breakaway, coulomb), may_fall)
+    return falls if scale.moves else value("if", may_fall, falls, coulomb)
