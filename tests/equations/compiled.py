@@ -80,6 +80,9 @@ class Model:
                 "relations_modes.c",
                 "contacts.c",
                 "contacts_box.c",
+                "contacts_checks.c",
+                "contacts_decision.c",
+                "contacts_impacts.c",
                 "domains.c",
                 "random.c",
             )
