@@ -10,7 +10,8 @@ from tests.equations.compiled import LENGTH, WORDS_OF_EVENTS, Origin, Words
 OF_EVENTS = [*WORDS_OF_EVENTS, "are_possible", "modes_are_possible", "moves_on", "is_at_rest"]
 OF_EVENTS += ["describe", "indicators", "errors", "reach"]
 INDICATOR = np.dtype([("kind", "i4"), ("gap", "i4"), ("state", "u8"), ("factor", "f8"),
-                      ("offset", "f8"), ("rises", "u1"), ("end", "u1", 7)])  # fmt: skip
+                      ("offset", "f8"), ("rises", "u1"), ("end", "u1", 7),
+                      ("is_far_above", "f8")])  # fmt: skip
 UNUSED, OF_STATE, OF_MODEL = range(3)
 USED = ((), ("state", "factor", "offset", "rises"), ("offset",))  # by kind
 T, SCALE = 3.0, 1 / 64  # s: the time, and that of series
