@@ -3,6 +3,7 @@
 PYTHONPATH=. build/venv/bin/python examples/models/draw.py [PICTURE]
 """
 
+import math
 import subprocess
 import sys
 import tempfile
@@ -29,7 +30,9 @@ RUNS = {
     "masses": (20.0, 0.05, {}, ["x[1]", "x[10]"]),
     "pwm": (0.02, 0.00002, {}, ["i"]),
     "axis": (1.0, 0.002, {}, ["x", "y"]),
+    "gearbox": (4.0, 0.002, {}, ["drive", "load"]),
 }
+INPUTS = {"gearbox": {"torque": lambda t: 0.013 * math.sin(math.pi * t)}}  # N.m; others rest
 
 
 def built(name: str, folder: Path) -> Path:
@@ -41,11 +44,12 @@ def built(name: str, folder: Path) -> Path:
     return fmu
 
 
-figure, axes = plt.subplots(2, 7, figsize=(20, 5), layout="constrained")
+figure, axes = plt.subplots(3, 5, figsize=(16, 8), layout="constrained")
 with tempfile.TemporaryDirectory() as folder:
     for axis, (name, (stop, step, start, drawn)) in zip(axes.flat, RUNS.items(), strict=True):
         fmu = built(name, Path(folder))
-        table = rparm.simulate(fmu, stop_time=stop, step=step, start_values=start)
+        given = {"start_values": start, "inputs": INPUTS.get(name, {})}
+        table = rparm.simulate(fmu, stop_time=stop, step=step, **given)
         x, *curves = drawn if drawn[0].startswith("(") else ["time", *drawn]
         x = x.strip("()")
         for curve in curves:

@@ -34,7 +34,8 @@ def do_new_model(options: argparse.Namespace) -> Ended:
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     first = f"#:schema ./{of_schema.name}\n" if text else ""
-    create(path, first + rendered("new_model.toml", name=options.name))
+    template = f"new_model_{options.kind}.toml" if options.kind else "new_model.toml"
+    create(path, first + rendered(template, name=options.name))
     if text and not of_schema.exists():
         create(of_schema, text)
     verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"

@@ -15,6 +15,7 @@ from tests.support.paths import ROOT
 sys.path.insert(0, str(ROOT / "fmu"))
 import building  # noqa: E402
 from compiler.interface import Declaration  # noqa: E402
+from compiler.read.content import FORCES  # noqa: E402
 from compiler.read.model_file import ModelFile, ModelFileError, read  # noqa: E402
 from compiler.write import c_model, declaration, lock  # noqa: E402
 
@@ -102,7 +103,8 @@ class Model:
         self.words = Words.in_dll(self.library, "equations_model")
         text, fields = (folder / "equations.h").read_text(), self.file.fields
         states = [v.name for v in self.file.of("states")]
-        names = {fields.value(v.name): v.name for v in self.file.variables.values() if v.is_real}
+        own = [v for v in self.file.variables.values() if v.is_real and v.section != FORCES]
+        names = {fields.value(v.name): v.name for v in own}
         names |= {fields.rate(name): f"d_{name}" for name in states}
         self.names = [names.get(place, place) for place in places("double", text)]
         self.ints = places("int", text)  # behind the doubles

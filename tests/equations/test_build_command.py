@@ -205,3 +205,21 @@ def test_a_new_model_is_one(tmp_path: Path) -> None:
         refused = call(*arguments)
         assert refused.returncode == 2 and mistake in refused.stderr
         assert refused.stderr.count("\n") == 1
+
+
+def test_a_new_model_with_friction_slides_bounces_and_sticks(tmp_path: Path) -> None:
+    """From 2 m/s, under 2 N: a stop at 0.2 m leaves half the speed, friction takes the rest."""
+
+    def call(*arguments: str) -> subprocess.CompletedProcess:
+        return python(*RPARM, *arguments, folder=tmp_path)
+
+    assert call("new-model", "Slider", "--with", "friction").returncode == 0
+    fmu = build(tmp_path / "Slider.toml", tmp_path)
+    run = simulated(fmu, 2.0, 0.1, {"d": 0.0, "sticks": 2.0})
+    fast = np.sqrt(4 - 4 * 0.2) / 2  # m/s, after the impact: too slow for the other stop
+    assert run["x"][-1] == pytest.approx(0.2 - fast**2 / 4, abs=1e-8)
+    assert run["stops.slide.loss"][-1] == pytest.approx(1.5 * fast**2, abs=1e-8)
+    assert run["friction.slide.mode"][-1] == 2 and run["v"][-1] == 0
+    refused = call("new-model", "Other", "--with", "belt")
+    assert refused.returncode == 2 and "invalid choice: 'belt' (choose from" in refused.stderr
+    assert "friction" in refused.stderr and refused.stderr.count("\n") == 1

@@ -185,6 +185,59 @@ def test_the_cart_and_its_pole_take_the_work_of_the_force(method: int) -> None:
     assert np.ptp(run["energy"]) > 1
 
 
+N, J1, J2, PLAY, M, T = 20.0, 2e-5, 0.02, np.radians(3), 0.2, 0.02  # of the gearbox
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_gearbox_turns_back_through_its_backlash(method: int) -> None:
+    """Plastic impacts keep the angular momentum: closed forms from one to the next."""
+    both, alone, back = N**2 * J1 + J2, T / (N * J1), 0.4  # s, when the torque turns
+    meet = np.sqrt(PLAY / alone)
+    begin = N**2 * J1 * alone * meet / both  # rad/s, after the impact
+    most = begin + (N * T - M) / both * (back - meet)
+    load = (begin + most) / 2 * (back - meet)
+    apart = np.sqrt(2 * PLAY / (alone - M / J2))
+    speeds = np.array([most - alone * apart, most - M / J2 * apart])
+    end = speeds @ [N**2 * J1, J2] / both
+    slid, stop = load + (most + speeds[1]) / 2 * apart, end * both / (N * T + M)
+    assert speeds[1] > 0 and end > 0  # the other flank is hit while the load still moves
+    phases = [  # begin, angle of the load, its speed, its acceleration
+        (0.0, 0.0, 0.0, 0.0),
+        (meet, 0.0, begin, (N * T - M) / both),
+        (back, load, most, -M / J2),
+        (back + apart, slid, end, (-N * T - M) / both),
+        (back + apart + stop, slid + end * stop / 2, 0.0, (-N * T + M) / both),
+    ]
+    torque = np.array([(0, T), (back, T), (back, -T), (1, -T)], [("time", "f8"), ("torque", "f8")])
+    values = {"e": 0.0, "solver_method": method}
+    options = {"relative_tolerance": 1e-11, "input": torque, "also": ["event_count"]}
+    run = simulated(example("gearbox"), 0.8, 0.01, values, **options)
+    for t, angle, speed, sticks in zip(
+        run["time"], run["load"], run["load_speed"], run["friction.bearing.mode"] == 2, strict=True
+    ):
+        since, phi, omega, acceleration = [phase for phase in phases if phase[0] <= t][-1]
+        s = t - since
+        assert angle == pytest.approx(phi + omega * s + acceleration * s**2 / 2, abs=1e-9)
+        assert speed == pytest.approx(omega + acceleration * s, abs=1e-8)
+        assert sticks == (since == 0.0)
+    assert run["event_count"][-1] == 3  # two impacts, and where the load turns back
+    play = run["drive"] - run["load"]
+    for first, last, side in ((meet, back - 1e-9, 1), (back + apart, 0.8, -1)):
+        touches = (run["time"] > first) & (run["time"] < last)
+        np.testing.assert_allclose(play[touches], side * PLAY / 2, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_gearbox_keeps_books_of_its_energy(method: int) -> None:
+    """Work of the torque: kinetic energy, heat of the bearing and of impacts."""
+    values = {"torque": T, "solver_method": method}
+    run = simulated(example("gearbox"), 1.0, 0.01, values, relative_tolerance=1e-11)
+    assert np.all(np.diff(run["load"]) >= 0) and run["stops.teeth.loss"][-1] > 1e-3
+    kinetic = (J1 * run["motor_speed"] ** 2 + J2 * run["load_speed"] ** 2) / 2
+    spent = kinetic + M * run["load"] + run["stops.teeth.loss"]
+    np.testing.assert_allclose(spent, T * run["motor"], rtol=0, atol=1e-9)
+
+
 def test_a_thousand_turns_keep_energy_and_momentum() -> None:
     start = {"solver_method": METHODS["taylor"], "max_internal_steps": 10**6}
     run = simulated(

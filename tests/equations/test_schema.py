@@ -147,7 +147,8 @@ def test_the_command_writes_what_a_new_model_names(tmp_path: Path, console: Cons
     assert written.read_text() == schemas.text("model") == console("schema")[1]
     assert not is_refused("model", (tmp_path / "Spring.toml").read_text())
     written.write_text("of another version")
-    assert console("new-model", "Other", "--output", tmp_path)[0] == 0
+    assert console("new-model", "Other", "--with", "friction", "--output", tmp_path)[0] == 0
+    assert not is_refused("model", (tmp_path / "Other.toml").read_text())
     assert written.read_text() == "of another version"
     assert console("schema", "model", "--output", tmp_path)[0] == 0
     assert written.read_text() == schemas.text("model")
