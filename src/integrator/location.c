@@ -62,24 +62,12 @@ static double error_of(const struct location *location, size_t state, double x) 
     return larger(tolerance, 2.0 * falls_roundings * DBL_EPSILON * larger(fabs(x), usual));
 }
 
-/* True if an indicator of the model may be at 0 within its error. */
-static bool errors_matter(const struct location *location) {
-    bool found = false;
-    for (size_t k = 0; k < location->used_count; k++) {
-        const size_t i = location->used[k];
-        const struct indicator *indicator = &location->indicators[i];
-        found |= indicator->kind == INDICATOR_OF_MODEL &&
-                 !(indicator->is_far_above > 0.0 && location->z[i] >= indicator->is_far_above);
-    }
-    return found;
-}
-
 /* Restarts the indicators of the model, whose noise follows from their limits so far. */
 static enum status restart_model(struct location *location, const double x[]) {
     const struct ode *ode = location->ode;
     const struct integrator_settings *settings = location->settings;
     const enum status status = ode->indicators(0.0, x, location->z, ode->context);
-    const bool has_errors = ode->rounding != NULL && errors_matter(location);
+    const bool has_errors = ode->rounding != NULL && location_errors_matter(location);
     if (has_errors) {
         for (size_t i = 0; i < ode->state_count; i++) {
             location->x[i] = 2.0 * DBL_EPSILON * fabs(x[i]);

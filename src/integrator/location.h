@@ -74,6 +74,18 @@ NONNULL void location_destroy(struct location *location);
 MUST_CHECK NONNULL enum status
 location_restart(struct location *location, const struct integrator_start *start, const double x[]);
 
+/* True if an indicator of the model may be at 0 within its error. */
+static inline bool location_errors_matter(const struct location *location) {
+    bool found = false;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        const struct indicator *indicator = &location->indicators[i];
+        found |= indicator->kind == INDICATOR_OF_MODEL &&
+                 !(indicator->is_far_above > 0.0 && location->z[i] >= indicator->is_far_above);
+    }
+    return found;
+}
+
 static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;
 }

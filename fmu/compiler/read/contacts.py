@@ -39,6 +39,10 @@ MODES = {
     },
 }
 POWER = of_exponents({"kg": 1, "m": 2, "s": -3})
+NAMES_OF_TURNS = {  # of torques and their impulses
+    of_exponents({"kg": 1, "m": 2, "s": -2}): "N.m",
+    of_exponents({"kg": 1, "m": 2, "s": -1}): "N.m.s",
+}
 
 
 def read(
@@ -131,12 +135,18 @@ def add_units(file: ModelFile, units: dict[str, Dimension | None]) -> dict[str, 
         found["restitution"] = of_exponents({})
         expected |= {e: found[key] for key, e in contact.given.items() if key in found}
         own = {contact.force: force, contact.variable("force"): force}
+        turns = any(
+            file.variables[name].unit.startswith("rad") for name in names(velocity.tree)
+            if name in file.variables
+        )  # fmt: skip
         if not contact.is_friction:
             impulse = times(force, second)
             own |= {contact.variable("impulse"): impulse, contact.variable("impulses"): impulse}
             own |= {contact.variable("loss"): times(POWER, second)}
         for name, dimension in own.items():
             units[name] = dimension
+            if turns and name != contact.variable("loss") and dimension in NAMES_OF_TURNS:
+                file.variables[name].unit = NAMES_OF_TURNS[dimension]
             exponents = zip(BASE, dimension, strict=True)
             file.variables[name].exponents = {base: whole(x) for base, x in exponents}
     return expected
