@@ -99,8 +99,9 @@ class Judge:
         self.plant = plant
         self.loop = EventLoop(plant)
         self.motion = self.loop.run(TIMES)
+        self.tails, low = tails(self.motion)
         if plant.is_round:  # a disturbance would end what is equal
-            size, other = 1e-8, EventLoop(plant, 1e-8, 1e-11)
+            size, other = 1e-8, EventLoop(plant, 1e-8)
         else:
             size, other = DISTURBANCE, EventLoop(plant.disturbed(DISTURBANCE))
         self.horizon, self.reason = STOP, ""
@@ -109,10 +110,12 @@ class Judge:
             self._compare(other.run(TIMES), size)
         except Chattering as error:
             self._end(0.0, str(error))
-        self._tails()
+        for _, begin, end in self.tails:
+            self.away &= (self.motion.times < begin - NEAR) | (self.motion.times > end + NEAR)
+        self._end(low - NEAR, "low flights")
         events = np.array([event.t for event in self.motion.events[1:]])
         self.counts = np.array([np.sum(events <= t) for t in TIMES])
-        ends = [tails[0][0] for tails in self.tails.values()]
+        ends = [begin for _, begin, _ in self.tails]
         # s; up to where numbers of events are equal: what begins in doubt may take one more
         self.counted = 0.0 if self.plant.is_round else min(ends, default=STOP)
         self.away &= self.motion.times < self.horizon
@@ -144,28 +147,6 @@ class Judge:
         if np.any(growth > LARGEST_GROWTH):
             self._end(TIMES[np.argmax(growth > LARGEST_GROWTH)], "a disturbance grows")
 
-    def _tails(self) -> None:
-        """Leave out the end of bouncing, which the tolerance decides; find low flights."""
-        self.tails: dict[int, list[tuple[float, float]]] = {}
-        low: dict[int, float] = {}
-        times = self.motion.times
-        for event in self.motion.events:
-            for k in event.rests:
-                begin = low.pop(k, event.t)
-                self.tails.setdefault(k, []).append((begin, event.t))
-                self.away &= (times < begin - NEAR) | (times > event.t + NEAR)
-            for k, flight in event.hits.items():
-                if k in event.rests:
-                    continue
-                if flight > LOW:
-                    if k in low:
-                        self._end(low[k] - NEAR, "low flights")
-                    low.pop(k, None)
-                else:
-                    low.setdefault(k, event.t)
-        for t in low.values():
-            self._end(t - NEAR, "low flights")
-
     def judge(self, run: Run) -> Iterator[tuple[str, str]]:
         """What a run contradicts, and how: the first of each kind."""
         found: dict[str, str] = {}
@@ -189,7 +170,7 @@ class Judge:
             one, two = getattr(run, name)[k], getattr(motion, name)[k]
             far = abs(one - two)
             if name == "impulse":
-                ended = [r for r, tails in self.tails.items() if tails[0][0] < TIMES[k]]
+                ended = [r for r, begin, _ in self.tails if begin < TIMES[k]]
                 far[ended] = 0.0
             if not np.all(far <= bound):
                 yield name, f"{one} for {two}, {np.max(far):.3g} away, {bound:.3g} allowed"
@@ -258,9 +239,28 @@ class Judge:
                 yield "loss falls", f"{run.loss[k - 1]} to {run.loss[k]}"
 
 
+def tails(motion: Motion) -> tuple[list[tuple[int, float, float]], float]:
+    """Ends of bouncing, which the tolerance decides: rows, times; when others get as low."""
+    found, low, others = [], {}, [np.inf]
+    for event in motion.events:
+        for k in event.rests:
+            found.append((k, low.pop(k, event.t), event.t))
+        for k in event.hits.keys() - event.rests:
+            if event.hits[k] < LOW:
+                low.setdefault(k, event.t)
+            elif k in low:
+                others.append(low.pop(k))
+    return found, min(*others, *low.values(), np.inf)
+
+
 def changes(motion: Motion) -> list[tuple[float, tuple]]:
-    """Times and modes, wherever modes change."""
-    keys = [(event.t, event.mode.key) for event in motion.events]
+    """Times and modes, wherever modes change before bouncing ends."""
+    ends = [(begin, end) for _, begin, end in tails(motion)[0]]
+    keys = [
+        (event.t, event.mode.key)
+        for event in motion.events
+        if not any(begin <= event.t < end for begin, end in ends)
+    ]
     return keys[:1] + [two for one, two in pairwise(keys) if one[1] != two[1]]
 
 
