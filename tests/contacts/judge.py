@@ -110,8 +110,9 @@ class Judge:
             self._compare(other.run(TIMES), size)
         except Chattering as error:
             self._end(0.0, str(error))
-        for _, begin, end in self.tails:
+        for k, begin, end in self.tails:
             self.away &= (self.motion.times < begin - NEAR) | (self.motion.times > end + NEAR)
+            self.errors[self.motion.times > end] += self._rubbed(k, begin, end)
         self._end(low - NEAR, "low flights")
         events = np.array([event.t for event in self.motion.events[1:]])
         self.counts = np.array([np.sum(events <= t) for t in TIMES])
@@ -146,6 +147,17 @@ class Judge:
         self.errors = FACTOR * TOLERANCE * growth
         if np.any(growth > LARGEST_GROWTH):
             self._end(TIMES[np.argmax(growth > LARGEST_GROWTH)], "a disturbance grows")
+
+    def _rubbed(self, k: int, begin: float, end: float) -> float:
+        """What other frictions that switch while bouncing ends may change of velocities."""
+        inside = [event.mode.friction for event in self.motion.events if begin <= event.t <= end]
+        if not np.any(np.delete(np.ptp(inside, axis=0), k)):
+            return 0.0
+        at = np.searchsorted(self.motion.times, end)
+        q, v = self.motion.q[min(at, len(TIMES) - 1)], self.motion.v[min(at, len(TIMES) - 1)]
+        free = np.full(len(self.loop.J), FREE)
+        most = self.loop.box(end, q, v, free)[1]
+        return 2 * (end - begin) * float(np.max(abs(self.loop.W @ self.loop.J.T) @ most))
 
     def judge(self, run: Run) -> Iterator[tuple[str, str]]:
         """What a run contradicts, and how: the first of each kind."""
