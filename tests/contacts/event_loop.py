@@ -52,6 +52,7 @@ class Event:
     mode: Mode  # from here on
     hits: dict[int, float] = field(default_factory=dict)  # rows, flights (m) after impacts
     rests: list[int] = field(default_factory=list)  # rows that end bouncing
+    struck: list[list[int]] = field(default_factory=list)  # rows, impact by impact
 
 
 @dataclass
@@ -258,11 +259,12 @@ class EventLoop:
         event = Event(t, None)
         for _ in range(ROUNDS):  # an impact may drive what was leaving into its stop
             v, P, losses, sides = self.impact(t, q, v, event)
-            for k in P:
-                if P[k] > 1e-9 * max(P.values()):  # not those that only rest
-                    impulse[k], loss[k] = P[k] * sides[k], loss[k] + losses[k]
             if not P:
                 break
+            struck = [k for k in P if P[k] > 1e-9 * max(P.values())]  # not those that only rest
+            event.struck.append(struck)
+            for k in struck:
+                impulse[k], loss[k] = P[k] * sides[k], loss[k] + losses[k]
         else:
             raise Chattering(f"{ROUNDS} impacts at {t}")
         rests = np.flatnonzero(abs(self.J @ v) <= 10 * AT_REST)

@@ -111,6 +111,7 @@ class Judge:
             self.away &= (self.motion.times < begin - NEAR) | (self.motion.times > end + NEAR)
             self.errors[self.motion.times > end] += self._rubbed(k, begin, end)
         self._end(low - NEAR, "low flights")
+        self._end(crowded(self.motion) - NEAR, "impacts in an order that rounding decides")
         events = np.array([event.t for event in self.motion.events[1:]])
         self.counts = np.array([np.sum(events <= t) for t in TIMES])
         ends = [begin for _, begin, _ in self.tails]
@@ -262,6 +263,13 @@ def tails(motion: Motion) -> tuple[list[tuple[int, float, float]], float]:
             elif k in low:
                 others.append(low.pop(k))
     return found, min(*others, *low.values(), np.inf)
+
+
+def crowded(motion: Motion) -> float:
+    """When stops are hit almost at once, but not by one impact."""
+    hits = [(event.t, rows) for event in motion.events for rows in event.struck]
+    near = (t for (t, one), (s, two) in pairwise(hits) if s - t < NEAR and set(one) != set(two))
+    return min(near, default=np.inf)
 
 
 def changes(motion: Motion) -> list[tuple[float, tuple]]:
