@@ -18,6 +18,7 @@ AT_REST = 1e-11  # m/s, what rounding leaves of a relative velocity
 AT_LIMIT = 1e-13  # m
 LONGEST_STEP = 0.02  # s
 SAMPLES = 10  # of each step, where conditions are looked at
+ROUNDS = 20  # of impacts at an instant
 AHEAD = (1e-6, 1e-4, 1e-2)  # s; where a force at its bound decides itself
 SLOW, FORWARD, BACKWARD = 2, 3, 1  # as the enumeration of friction
 FREE, LOWER, UPPER = 1, 2, 3  # as the enumeration of stops
@@ -51,6 +52,7 @@ class Event:
     mode: Mode  # from here on
     hits: dict[int, float] = field(default_factory=dict)  # rows, flights (m) after impacts
     rests: list[int] = field(default_factory=list)  # rows that end bouncing
+    struck: list[list[int]] = field(default_factory=list)  # rows, impact by impact
 
 
 @dataclass
@@ -67,6 +69,8 @@ class Motion:
     sure: Numbers  # times, rows: how far the mode is from another
     events: list[Event]
     modes: list[Mode]
+    end: float = np.inf  # s; where the loop gave up
+    reason: str = ""
 
 
 class EventLoop:
@@ -134,9 +138,13 @@ class EventLoop:
         mode: Mode,
     ) -> None:  # fmt: skip
         before, closed = mode.signs * ~rests, mode.closed
+
+        def rates(t: float, q: Numbers, v: Numbers) -> Numbers:
+            return self.accelerations(t, q, v, rests, before, closed)[0]
+
         if ahead:
-            a = self.accelerations(t, q, v, rests, before, closed)[0]
-            t, q, v = t + ahead, q + ahead * v + ahead**2 / 2 * a, v + ahead * a
+            q, v = self._moved(t, q, v, ahead, rates)
+            t += ahead
         a, f, (low, high) = self.accelerations(t, q, v, rests, before, closed)
         moved = self.J @ a
         scale = (1e-6 * ahead or 1e-9) * (1 + np.max(abs(self.plant.load(t, q, v))))
@@ -146,6 +154,16 @@ class EventLoop:
             mode.is_sure[k] = is_held != moves
             mode.is_held[k] = is_held
             mode.signs[k] = 0.0 if is_held else np.sign(moved[k])
+
+    @staticmethod
+    def _moved(t: float, q: Numbers, v: Numbers, h: float, rates: Callable) -> tuple:
+        """A step of Runge and Kutta."""
+        n, x, k = len(q), np.concatenate([q, v]), []
+        for part in (0.0, 0.5, 0.5, 1.0):
+            at = x + part * h * k[-1] if k else x
+            k.append(np.concatenate([at[n:], rates(t + part * h, at[:n], at[n:])]))
+        x = x + h / 6 * (k[0] + 2 * k[1] + 2 * k[2] + k[3])
+        return x[:n], x[n:]
 
     def accelerations(
         self, t: float, q: Numbers, v: Numbers, rests: Numbers, signs: Numbers, closed: Numbers
@@ -239,10 +257,16 @@ class EventLoop:
     def instant(self, t: float, q: Numbers, v: Numbers, impulse: Numbers, loss: Numbers) -> tuple:
         """Impacts, rest and mode of an instant; impulses and losses change in place."""
         event = Event(t, None)
-        v, P, losses, sides = self.impact(t, q, v, event)
-        for k in P:
-            if P[k] > 1e-9 * max(P.values()):  # not those that only rest
+        for _ in range(ROUNDS):  # an impact may drive what was leaving into its stop
+            v, P, losses, sides = self.impact(t, q, v, event)
+            if not P:
+                break
+            struck = [k for k in P if P[k] > 1e-9 * max(P.values())]  # not those that only rest
+            event.struck.append(struck)
+            for k in struck:
                 impulse[k], loss[k] = P[k] * sides[k], loss[k] + losses[k]
+        else:
+            raise Chattering(f"{ROUNDS} impacts at {t}")
         rests = np.flatnonzero(abs(self.J @ v) <= 10 * AT_REST)
         v = v - self.W @ self.J[rests].T @ np.linalg.solve(
             self.A[np.ix_(rests, rests)], self.J[rests] @ v
@@ -252,31 +276,32 @@ class EventLoop:
 
     def run(self, times: Numbers, most: int = 2000) -> Motion:
         """The motion at rising times, the first of which is 0."""
-        plant, m = self.plant, len(self.J)
-        t, q, v = 0.0, plant.q.copy(), plant.v.copy()
-        impulse, loss = np.zeros(m), np.zeros(m)
-        rows, events = [], []
+        t, q, v = 0.0, self.plant.q.copy(), self.plant.v.copy()
+        impulse, loss = np.zeros(len(self.J)), np.zeros(len(self.J))
+        rows, events, end, reason = [], [], np.inf, ""
         while True:
-            if len(events) > most:
-                raise Chattering(f"{most} events at {t}")
-            v, event = self.instant(t, q, v, impulse, loss)
-            events.append(event)
-            part = Part(self, event.mode, t, q, v)
-            until = part.run(times[-1])
-            if part.end is None:
-                until = np.inf
+            try:
+                v, event = self.instant(t, q, v, impulse, loss)
+                part = Part(self, event.mode, t, q, v)
+                part.run(times[-1])
+                if len(events) > most:
+                    raise Chattering(f"{most} events at {t}")
+            except Chattering as error:
+                end, reason = t, str(error)
+            else:
+                events.append(event)
+            until = part.end if end > t and part.end is not None else np.inf
             # behind an event: times in front of it keep its values
             for s in times[(times >= t) & (times < until)]:
                 rows.append((s, *part.row(s), impulse.copy(), loss.copy(), event.mode))
-            if part.end is None:
+            if until == np.inf:
                 break
-            t, (q, v) = part.end, part.at(part.end)
+            t, (q, v) = until, part.at(until)
             q = self.put_back(q, event.mode.closed)
         columns = [np.array(column) for column in zip(*(row[:-1] for row in rows), strict=True)]
+        modes = [row[-1] for row in rows]
         s, q, v, friction, stop, sure, impulse, loss = columns
-        return Motion(
-            s, q, v, friction, stop, impulse, loss, sure, events, [row[-1] for row in rows]
-        )
+        return Motion(s, q, v, friction, stop, impulse, loss, sure, events, modes, end, reason)
 
 
 class Part:
@@ -316,19 +341,20 @@ class Part:
                 found += [gap for gap in (x - stop.lower, stop.upper - x) if np.isfinite(gap)]
         return np.array(found)
 
-    def run(self, stop: float) -> float:
+    def run(self, stop: float) -> None:
         """Up to the first margin that ends, or to this time."""
         scale = max(1.0, *abs(self.start))
         if stop <= self.begin:
-            return stop
+            return
         solver = DOP853(
             self.rates, self.begin, self.start, stop, LONGEST_STEP,
             self.loop.tolerance, self.loop.tolerance * 0.1 * scale,
         )  # fmt: skip
         # what begins at 0 may stay there, up to rounding
-        floor = np.full(len(self.margins(self.begin, self.start)), 1e-14)
+        begin = self.margins(self.begin, self.start)
+        floor = np.full(len(begin), 1e-14)
         floor[: 2 * len(self.held)] = 1e-10
-        seen = floor < 0.0
+        seen = begin > floor
         last = self.begin
         while solver.status == "running":
             solver.step()
@@ -339,10 +365,9 @@ class Part:
                 ended = np.flatnonzero((margins <= 0.0) & (seen | (margins < -1e-7)))
                 if ended.size:
                     self.end = self.first(ended, last, s, dense)
-                    return self.end
+                    return
                 seen |= margins > floor
                 last = s
-        return stop
 
     def samples(self, begin: float, end: float) -> list[float]:
         """Times within a step; many right behind the event."""
