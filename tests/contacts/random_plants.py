@@ -48,6 +48,11 @@ class Friction:
     ratio: float = 1.0  # of breakaway to it
     speed: float = 0.0  # of Stribeck
 
+    @property
+    def is_off(self) -> bool:
+        """Whether its limit is always 0."""
+        return self.coulomb.base == 0 and self.coulomb.more == 0
+
     def at(self, speed: float, t: float, q: Numbers, v: Numbers) -> float:
         """What it is at a relative speed."""
         coulomb = self.coulomb.at(t, q, v)
