@@ -453,7 +453,8 @@ class Builder:
             if friction is not None:
                 slides = self.sliding(friction)
                 in_rates[friction.force] = self.choice(stuck, graph.negative(hold), slides)
-                shown[friction.force] = in_rates[friction.force]
+                held = graph.value("-", self.zero, hold)  # 0, not -0
+                shown[friction.force] = self.choice(stuck, held, slides)
             for contact in direction.stops:
                 force, alone = self.over(hold, contact.ratio), self.alone(direction, contact)
                 in_rates[contact.force] = self.choice(alone, force, self.zero)

@@ -52,8 +52,11 @@ def describe(events: Events) -> list[str]:
         stores.append(store(Place("indicator[", i, "]"), found))
     for i, limit in enumerate(events.limits, len(events.located)):
         condition, *cases = limit.cases
-        first, second = (_described(events, code, Relation(x, True, None, None, one))
-                         for x in cases)  # fmt: skip
+        # what breaks away begins with a rate of 0, of which rounding must not make a fall
+        first, second = (
+            _described(events, code, Relation(x, True, None, None, one), limit.most is None)
+            for x in cases
+        )
         if limit.most is not None and not limit.most.moves:
             first = "relations_force_indicator", code.of(limit.most)
             second = first if cases[0] is cases[1] else second
@@ -77,14 +80,15 @@ def _state_of(events: Events, distance: Value) -> tuple[int, Value, Value] | Non
     return None if factor.moves else (place, x, factor)
 
 
-def _described(events: Events, code: Code, relation: Relation) -> Operand:
+def _described(events: Events, code: Code, relation: Relation, may_rise: bool = True) -> Operand:
     """How an indicator follows from the states: from one by a factor, if it can be."""
     distance, zero = relation.distance, events.graph.number(0.0)
     found = _state_of(events, distance)
     if found is None:
         return "relations_model_indicator", code.of(relation.limit or zero)
     place, x, factor = found
-    rate = zero if ("time", "") in x.value.leaves else x.value  # unknown here
+    is_known = may_rise and ("time", "") not in x.value.leaves
+    rate = x.value if is_known else zero
     at_zero = Code(code.leaves.but({("state", x.name): 0.0}))
     at_zero.statements = code.statements  # which have its constants, too
     offset = at_zero.of(distance)
