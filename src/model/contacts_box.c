@@ -53,23 +53,24 @@ static void solve_pattern(const struct box *box, struct box_solution *to) {
 
 /* By how much an unknown violates its condition, over the size of its terms. */
 static double violation(const struct box *box, const struct box_solution *at, int i) {
+    double terms = fabs(box->a0[i]);
+    for (int j = 0; j < box->count; j++) {
+        terms += j == i && at->leaves[i] == 0 ? 0.0 : fabs(box->W[i][j] * at->T[j]);
+    }
     if (at->leaves[i] == 0) {
         const double high = at->T[i] - box->high[i];
         const double low = box->low[i] - at->T[i];
         const double over = high > low ? high : low;
         const double bound = high > low ? box->high[i] : box->low[i];
-        const double scale = fabs(at->T[i]) + (isfinite(bound) ? fabs(bound) : 0.0);
+        const double own = fabs(at->T[i]) + (isfinite(bound) ? fabs(bound) : 0.0);
+        const double scale = own + terms / fabs(box->W[i][i]);
         const double relative = scale > 0.0 ? over / scale : over;
         return isnan(at->T[i]) ? INFINITY : relative > 0.0 && relative <= rounding ? 0.0 : relative;
     }
     if (!isfinite(at->T[i]) || at->a[i] == 0.0) {
         return INFINITY; // what leaves without an acceleration stays
     }
-    double scale = fabs(box->a0[i]);
-    for (int j = 0; j < box->count; j++) {
-        scale += fabs(box->W[i][j] * at->T[j]);
-    }
-    return -at->leaves[i] * at->a[i] / scale;
+    return -at->leaves[i] * at->a[i] / terms;
 }
 
 /* Writes the misfit, and returns the worst unknown. */
