@@ -192,3 +192,111 @@ b = { force = "Q", position = "y", velocity = "w", lower = "0", restitution = "0
     with pytest.raises(Exception, match="fmi2ExitInitializationMode"):
         simulated(made(text), 1, 0.1, {}, logger=log)
     assert said == ["at t = 0: no motion fits stops.a and stops.b"]
+
+
+@EACH_METHOD
+def test_an_impact_leaves_the_impulse_of_another_stop(method: str) -> None:
+    """Uncoupled: v^2 = 2 3 0.02 at the first stop, 2 3 0.1 at the second one."""
+    text = """name = "Apart"
+[states]
+x = { derivative = "v" }
+v = { derivative = "P - 3" }
+y = { start = -0.1, derivative = "w" }
+w = { derivative = "Q + 3" }
+[stops]
+a = { force = "P", position = "x", velocity = "v", lower = "-0.02", restitution = "0" }
+b = { force = "Q", position = "y", velocity = "w", upper = "0", restitution = "0" }
+"""
+    start = {"solver_method": METHODS[method]}
+    end = simulated(made(text), 1, 0.1, start, relative_tolerance=1e-11)[-1]
+    for name, way, sign in (("a", 0.02, 1), ("b", 0.1, -1)):
+        assert end[f"stops.{name}.impulse"] == pytest.approx(sign * np.sqrt(6 * way), abs=1e-9)
+
+
+@EACH_METHOD
+def test_two_stops_jam_a_mechanism(method: str) -> None:
+    """The second one closes at 0.6325 s, the first one at rest: 1 + 0.5 Q = 0, P + Q = 0."""
+    text = """name = "Jam"
+[states]
+x = { derivative = "v" }
+y = { derivative = "w" }
+v = { derivative = "1 + 0.5 * Q" }
+w = { derivative = "P + Q" }
+[stops.a]
+force = "P"
+position = "y"
+velocity = "w"
+lower = "-0.479"
+restitution = "0"
+[stops.b]
+force = "Q"
+position = "y + 0.5 * x"
+velocity = "w + 0.5 * v"
+upper = "0.1"
+restitution = "0"
+"""
+    start = {"solver_method": METHODS[method]}
+    end = simulated(made(text), 2, 0.01, start, relative_tolerance=1e-10)[-1]
+    assert [end["x"], end["y"]] == pytest.approx([1.158, -0.479], abs=1e-9)
+    assert [end["v"], end["w"]] == pytest.approx([0, 0], abs=1e-12)
+    assert [end["stops.a.force"], end["stops.b.force"]] == pytest.approx([2, -2])
+
+
+@EACH_METHOD
+def test_velocities_that_follow_from_each_other_rest_together(method: str) -> None:
+    """Friction on v1 - v2 and on v1 + v2 under a sine: as often as an event loop has it."""
+    text = """name = "Cross"
+[states]
+v1 = { derivative = "3.95 * sin(6.3 * time + 1.07) + F - G" }
+v2 = { derivative = "-F - G" }
+[friction.difference]
+force = "F"
+velocity = "v2 - v1"
+coulomb = "1.66"
+[friction.sum]
+force = "G"
+velocity = "v1 + v2"
+coulomb = "2"
+"""
+    start = {"solver_method": METHODS[method]}
+    also = ["event_count", "last_event_time"]
+    run = simulated(made(text), 3, 0.01, start, relative_tolerance=1e-10, also=also)
+    times = np.unique(run["last_event_time"][run["event_count"] > 0])
+    assert times[:3] == pytest.approx([0.263984, 0.487271, 0.763129], abs=1e-6)
+    assert run["event_count"][-1] == 12
+
+
+@EACH_METHOD
+def test_friction_stops_on_a_closed_stop(method: str) -> None:
+    """At rest F = t - 3 t / 2.05, below its limit."""
+    text = """name = "Held"
+[states]
+x = { derivative = "v" }
+y = { derivative = "w" }
+v = { derivative = "time + P - F" }
+w = { derivative = "-3 * time - 2.05 * P" }
+[stops.a]
+force = "P"
+position = "x - 2.05 * y"
+velocity = "v - 2.05 * w"
+upper = "1"
+restitution = "0"
+[friction.a]
+force = "F"
+velocity = "v"
+coulomb = "2"
+"""
+    start = {"solver_method": METHODS[method]}
+    run = simulated(made(text), 3, 0.01, start, relative_tolerance=1e-10, also=["event_count"])
+    end = run[-1]
+    assert [end["v"], end["w"], end["friction.a.mode"], end["event_count"]] == [0, 0, STUCK, 2]
+    forces = [end["friction.a.force"], end["stops.a.force"]]
+    assert forces == pytest.approx([3 - 9 / 2.05, -9 / 2.05])
+
+
+@EACH_METHOD
+def test_an_effort_at_its_limit_that_falls_at_once(method: str) -> None:
+    """It stays, without an event, though rounding puts it beyond."""
+    run = run_of(method, v=0, push="(3 - 6 * time) / 0.5250000000000001",
+                 coulomb="3 / 0.5250000000000001", stop=0.9)  # fmt: skip
+    assert run["event_count"][-1] == 0 and run["x"][-1] == 0

@@ -18,15 +18,17 @@ from tests.contacts.judge import STOP, TIMES, Judge, Run, failures
 from tests.contacts.random_plants import Coulomb, Friction, Numbers, Plant, Row, Stop, plant
 
 COUNT = int(os.environ.get("CONTACT_PLANTS", "40"))
+FAILED = (65, 402, 444, 684, 997)  # seeds that have done so
 KNOWN = 0.9  # of all times, up to horizons
 G = 9.81
 
 
 def test_random_plants_follow_the_event_loop() -> None:
     """A failure is repeated by python -m tests.contacts.judge SEED."""
+    seeds = [*range(COUNT), *FAILED]
     judged = partial(failures, is_full=COUNT > 100)
     with ProcessPoolExecutor(os.cpu_count()) as pool:
-        made = [*pool.map(judged, range(COUNT), chunksize=2)]
+        made = [*pool.map(judged, seeds, chunksize=2)]
     found = [text for _, texts in made for text in texts]
     assert not found, "\n".join(found)
     assert np.mean([horizon for horizon, _ in made]) > KNOWN * STOP
