@@ -150,8 +150,8 @@ def _further(named: Schema) -> dict[str, Schema]:
 
 
 def _friction() -> Schema:
-    """Return the schema of an element of [friction]: breakaway and stribeck come together."""
-    needed = {"breakaway": ["stribeck"], "stribeck": ["breakaway"]}
+    """Return the schema of an element of [friction]: stribeck comes with breakaway."""
+    needed = {"stribeck": ["breakaway"]}
     found = _keys(reader.FRICTION, *contacts.NEEDED[contacts.FRICTION])
     return found | {"dependentRequired": needed}
 

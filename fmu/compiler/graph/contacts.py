@@ -136,6 +136,10 @@ class Builder:
                 self._find_place(contact, direction)
 
     def _check_reads(self, contact: Contact, key: str) -> None:
+        read = contact.given[key].leaves & {(c.mode.op, c.mode.name) for c in self.contacts}
+        if read:
+            name = min(name for _, name in read)
+            raise ContactError(contact, key, f"reads {name}, which is decided together with it")
         read = contact.given[key].leaves & self.forces.keys()
         if read:
             name = min(name for _, name in read)
@@ -179,10 +183,14 @@ class Builder:
         """Add a contact to the direction of its velocity."""
         row, rest = found
         for direction in self.directions:
-            ratio = self._ratio(contact.given["velocity"], row, direction)
+            ratio = self._ratio(row, direction)
             if ratio is not None:
+                velocity, first = contact.given["velocity"], direction.contacts[0].name
+                if not are_equal(velocity, self._times(ratio, direction.velocity)):
+                    text = f"differs from that of {first} by what the time or parameters move"
+                    raise ContactError(contact, "velocity", text)
                 if contact.is_friction:
-                    text = f"is that of {direction.contacts[0].name}: add the two limits in one"
+                    text = f"is that of {first}: add the two limits in one"
                     raise ContactError(contact, "velocity", text)
                 contact.ratio = ratio
                 direction.contacts.append(contact)
@@ -229,18 +237,18 @@ class Builder:
         found = {direction: x for x, direction in by_state.items()}
         return {direction: found[direction] for direction in self.directions}
 
-    def _ratio(self, velocity: Value, row: dict[Value, Value], other: Direction) -> Value | None:
-        """Return a velocity over that of a direction, if that is fixed."""
-        if velocity is other.velocity or row == other.row:
+    def _ratio(self, row: dict[Value, Value], other: Direction) -> Value | None:
+        """Return factors of states over those of a direction, if they have one ratio."""
+        if row == other.row:
             return self.one
         if row.keys() != other.row.keys():
             return None
         if all(self._opposite(row[x], other.row[x]) for x in row):
             return self.graph.number(-1.0)
-        if len(row) == 1:
-            ((x, factor),) = row.items()
-            return self.graph.simple("/", factor, other.row[x])
-        return None
+        first, *others = row
+        ratio = self.graph.simple("/", row[first], other.row[first])
+        scaled = [(row[x], self._times(ratio, other.row[x])) for x in others]
+        return ratio if all(are_equal(*pair) for pair in scaled) else None
 
     def _opposite(self, a: Value, b: Value) -> bool:
         if a.op == b.op == "number":

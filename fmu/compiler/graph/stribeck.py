@@ -22,6 +22,8 @@ def size(graph: Graph, given: dict[str, Value], is_backward: Value | None = None
     """
     coulomb, breakaway, scale = (given[key] for key in ("coulomb", "breakaway", "stribeck"))
     value, zero, one = graph.value, graph.number(0.0), graph.number(1.0)
+    if scale.op == "number" and scale.number == 0.0:  # a fall is refused where it would be
+        return coulomb
     compared = partial(graph.value, name=REACHED)
     w = value("/", given["velocity"], scale)
     if is_backward is not None:

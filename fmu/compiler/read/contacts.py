@@ -60,10 +60,6 @@ def read(
                 raise ModelFileError(f"{key} is missing")
         if section == STOPS and not given.keys() & {"lower", "upper"}:
             raise ModelFileError("expected lower or upper: where it stops")
-        if "breakaway" in given and "stribeck" not in given:
-            raise ModelFileError(
-                "breakaway: expected stribeck, too, the velocity at which friction falls"
-            )
         if "stribeck" in given and "breakaway" not in given:
             raise ModelFileError("stribeck: expected breakaway, too, the friction at rest")
     text = given.pop("force")

@@ -30,6 +30,7 @@ WRITTEN = {  # where files have them
     OPTIONS: "parameters",
     SWITCHES: "inputs",
     COUNTS: "discrete",
+    FORCES: "forces of friction and stops",
 }
 CALCULATED = (ALGEBRAIC, "where", "outputs")  # sections of what follows from all others
 BOOLEAN, INTEGER = "Boolean", "Integer"

@@ -249,6 +249,9 @@ def _solve_contacts(file: ModelFile) -> None:
         )
         for contact in file.contacts
     ]
+    for contact in found:
+        if "breakaway" in contact.given:
+            contact.given.setdefault("stribeck", graph.number(0.0))
     before = {state.leaf: state.value for state in states}
     try:
         graph.contacts, _, shown, rates = contacts.Builder(graph, found, before).build()

@@ -6,6 +6,7 @@ from functools import partial, reduce
 from typing import TYPE_CHECKING
 
 from ..graph.contacts import STUCK
+from ..graph.graph import is_number
 from . import c_contacts, c_undefined
 from .c_code import Code
 from .c_text import indented
@@ -124,6 +125,7 @@ def _reach(events: Events) -> dict[str, list[str]]:
         (direction, direction.friction)
         for direction in graph.contacts.directions
         if direction.friction and "breakaway" in direction.friction.given
+        and not is_number(direction.friction.given["stribeck"], 0.0)
         and not _is_of_time(direction.friction.given["stribeck"], direction.velocity)
     ]  # fmt: skip
     if not falling:
