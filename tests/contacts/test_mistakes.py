@@ -39,7 +39,7 @@ ROWS = [
     ('coulomb = "1"', 'coulomb = "0.3 * P"', "coulomb: reads the unknown force P: then no motion"),
     ('coulomb = "1"', """coulomb = "1 if friction.slide.mode == 'stuck' else 2\"""",
      "coulomb: reads friction.slide.mode, which is decided together with it"),
-    ('velocity = "v"', 'velocity = "v - 0.5"', "velocity: differs from that of friction.slide by what"),
+    ('velocity = "v"', 'velocity = "v - 0.5"', "velocity: differs from that of friction.slide"),
     ('coulomb = "1"', 'coulomb = "1"\nstribeck = "2"', "stribeck: expected breakaway, too"),
     ('coulomb = "1"\n', "", "line 10: [friction.slide]: coulomb is missing"),
     ('force = "F"', 'force = "F + 1"', "force: expected a name that the equations use"),
