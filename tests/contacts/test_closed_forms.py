@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -14,7 +15,9 @@ from tests.equations.examples import METHODS, quick, simulated
 
 BUILT = TemporaryDirectory(prefix="rparm-contacts-")
 EACH_METHOD = pytest.mark.parametrize("method", METHODS)
-EACH_RUN = pytest.mark.parametrize(("version", "tolerance"), [("2.0", 1e-8), ("3.0", 1e-11)])
+EACH_RUN = pytest.mark.parametrize(
+    ("version", "tolerance"), [*product(["2.0", "3.0"], [1e-8, 1e-11])]
+)
 BACKWARD, STUCK, FORWARD = 1, 2, 3
 FREE, LOWER, UPPER = 1, 2, 3
 
