@@ -12,6 +12,7 @@
 
 #include "model.h"
 
+struct call;
 struct given;
 struct compared;
 
@@ -63,6 +64,9 @@ struct contacts {
     const struct direction *direction;
     const size_t *moved; /* states that impulses move */
     size_t indicator;    /* first one of contacts: each has two */
+    /* contacts_update: FMUs whose model does not name it are linked without it. */
+    enum status (*update)(const struct call *call, const struct event *event, bool is_first,
+                          bool is_start, bool *changes);
     /* Writes all of `to`. tolerance: of each state, in its unit. */
     void (*measure)(const void *values, double t, const double tolerance[],
                     const struct contacts_measured *to);
@@ -88,8 +92,6 @@ struct contacts_room {
             0                                                                                      \
         }                                                                                          \
     }
-
-struct call;
 
 /* Decides all contacts: places what has reached a stop there, applies impacts, and writes states
  * and modes. is_first: of this event, so that what has triggered counts; is_start: a position

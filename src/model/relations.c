@@ -367,7 +367,7 @@ static enum status follow_contacts(const struct call *call, const struct event *
         if (is_read) {
             modes_compare(call, call->room.tolerance, call->room.before);
         }
-        status = contacts_update(call, event, is_first && count == 0, is_start, &differs);
+        status = model->contacts->update(call, event, is_first && count == 0, is_start, &differs);
         *changes |= differs;
         differs = differs && status == STATUS_OK && is_read && follow_change(call);
     }
