@@ -8,7 +8,7 @@
 static const double drift = 1e-10; // of a velocity that is held, between events, over its terms
 
 static struct contacts_measured measured_in(const struct contacts *model, double *room) {
-    const int directions = model->direction_count, contacts = model->contact_count;
+    const ptrdiff_t directions = model->direction_count, contacts = model->contact_count;
     double *of_contacts = room + 6 * directions;
     double *others = of_contacts + 13 * contacts;
     return (struct contacts_measured){
@@ -171,7 +171,7 @@ static void write_modes(const struct work *work) {
 static struct work work_of(const struct call *call, const struct event *event) {
     const struct contacts *model = call->model->contacts;
     const struct contacts_room room = call->room.contacts;
-    const int directions = model->direction_count;
+    const ptrdiff_t directions = model->direction_count;
     struct work work = {.call = call, .model = model, .event = event};
     work.now = measured_in(model, room.measured);
     work.hold = room.hold;

@@ -61,7 +61,7 @@ bool contacts_decide(struct work *work) {
     memset(work->pattern, 0, (size_t)work->model->direction_count * sizeof *work->pattern);
     memset(work->hold, 0, (size_t)work->model->direction_count * sizeof *work->hold);
     for (int block = 0; block < work->model->block_count; block++) {
-        int member[CONTACTS_MOST_COUPLED];
+        int member[CONTACTS_MOST_COUPLED] = {0};
         struct box box;
         struct box_solution found;
         const int count = contacts_members(work, block, work->rests, member);
@@ -202,7 +202,7 @@ bool contacts_break_away(struct work *work) {
     const bool is_known = work->event == NULL || work->event->du_is_known;
     bool leaves = false;
     for (int block = 0; block < work->model->block_count; block++) {
-        int member[CONTACTS_MOST_COUPLED], at[CONTACTS_MOST_COUPLED];
+        int member[CONTACTS_MOST_COUPLED] = {0}, at[CONTACTS_MOST_COUPLED] = {0};
         int limits;
         struct box rates;
         struct box_solution found;

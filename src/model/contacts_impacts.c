@@ -80,7 +80,7 @@ static bool hardly_leaves(const struct work *work, int k) {
 static void solve_impulses(const struct work *work, const int is_member[], const double change[],
                            double P[]) {
     for (int block = 0; block < work->model->block_count; block++) {
-        int member[CONTACTS_MOST_COUPLED];
+        int member[CONTACTS_MOST_COUPLED] = {0};
         struct box box;
         struct box_solution found;
         const int count = contacts_members(work, block, is_member, member);
@@ -188,7 +188,7 @@ static void strike(struct work *work, bool is_elastic) {
         P[k] = 0.0;
     }
     for (int block = 0; block < work->model->block_count; block++) {
-        int member[CONTACTS_MOST_COUPLED];
+        int member[CONTACTS_MOST_COUPLED] = {0};
         struct box box;
         struct box_solution found;
         const int size = contacts_members(work, block, touches, member);
