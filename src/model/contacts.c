@@ -1,4 +1,3 @@
-#include "contacts.h"
 #include "contacts_work.h"
 
 #include <math.h>
@@ -80,9 +79,9 @@ static bool is_held(const struct work *work, int direction) {
     bool found = false;
     for (int e = 0; e < work->model->contact_count; e++) {
         const struct contact *contact = &work->model->contact[e];
-        const int free = contact->is_friction ? FRICTION_STUCK : STOPS_FREE;
-        found |=
-            contact->direction == direction && (*mode_of(work, e) == free) == contact->is_friction;
+        const int mode = *mode_of(work, e);
+        const bool holds = contact->is_friction ? mode == FRICTION_STUCK : mode != STOPS_FREE;
+        found |= contact->direction == direction && holds;
     }
     return found;
 }
@@ -182,7 +181,8 @@ static struct work work_of(const struct call *call, const struct event *event) {
     work.pattern = work.rests + directions;
     work.leaves = work.pattern + directions;
     work.stop = work.leaves + directions;
-    work.friction = work.stop + 2 * directions;
+    work.marked = work.stop + directions;
+    work.friction = work.marked + directions;
     work.hit = work.friction + directions;
     work.struck = work.hit + model->contact_count;
     work.modes = work.struck + model->contact_count;

@@ -195,7 +195,7 @@ static bool find_sides(const struct work *work, int side[]) {
 }
 
 bool contacts_break_away(struct work *work) {
-    int *side = work->stop + work->model->direction_count;
+    int *side = work->marked;
     if (!find_sides(work, side)) {
         return false;
     }

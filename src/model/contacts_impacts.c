@@ -145,7 +145,7 @@ static void catch_on_stops(struct work *work) {
     (void)contacts_decide(work);
     is_any = false;
     double *P = work->hold, *change = work->acceleration;
-    int *caught = work->stop + count;
+    int *caught = work->marked;
     for (int k = 0; k < count; k++) {
         const bool hardly = hardly_leaves(work, k);
         const double speed = fabs(work->now.velocity[k]);

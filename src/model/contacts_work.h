@@ -20,6 +20,7 @@ struct work {
     int *friction;                        // that may hold it, or -1
     int *sense;                           // of a closed stop's force; 0 if there is none
     int *stop;                            // contact that is closed
+    int *marked;                          // for one step of a function
     int *rests;                           // 1 if the velocity is 0
     int *pattern;                         // sign in which a direction at rest begins to move
     int *leaves;                          // sense in which one has triggered that it leaves

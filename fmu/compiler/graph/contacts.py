@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from . import algebraic, stribeck
 from .algebraic import replaced
-from .held import Held
+from .held import Held, is_opposite
 from .samples import are_equal, exact
 
 if TYPE_CHECKING:
@@ -42,6 +42,11 @@ class Contact:
     ratio: Value | None = None  # of its velocity to that of its direction
     place: tuple[Value, Value] | None = None  # of stops: state that a limit sets, its factor
     tolerances: dict[Value, Value] = field(default_factory=dict)  # factors of states in it
+
+    @property
+    def breakaway(self) -> Value:
+        """The largest friction at rest."""
+        return self.given.get("breakaway", self.given["coulomb"])
 
 
 @dataclass(eq=False)
@@ -148,19 +153,16 @@ class Builder:
 
     def _active(self, contact: Contact) -> Value | None:
         """Return when a contact can hold: friction also not where a fixed limit is 0."""
-        found, limit = contact.given.get("while"), self.breakaway(contact)
+        found = contact.given.get("while")
         if found is not None and found.moves:
             raise ContactError(contact, "while", "moves: expected parameters and modes")
-        if limit is None or limit.moves:
+        if not contact.is_friction or contact.breakaway.moves:
             return found
+        limit = contact.breakaway
         if limit.op == "number" and limit.number > 0:
             return found
         exists = self.graph.value("not", self.graph.value("==", limit, self.zero))
         return exists if found is None else self.graph.value("and", found, exists)
-
-    def breakaway(self, contact: Contact) -> Value | None:
-        """Return the largest friction at rest."""
-        return contact.given.get("breakaway", contact.given.get("coulomb"))
 
     def _row(self, contact: Contact, key: str, value: Value) -> tuple[dict[Value, Value], Value]:
         """Return factors of the states in a value, and the rest."""
@@ -243,17 +245,12 @@ class Builder:
             return self.one
         if row.keys() != other.row.keys():
             return None
-        if all(self._opposite(row[x], other.row[x]) for x in row):
+        if all(is_opposite(row[x], other.row[x]) for x in row):
             return self.graph.number(-1.0)
         first, *others = row
         ratio = self.graph.simple("/", row[first], other.row[first])
         scaled = [(row[x], self._times(ratio, other.row[x])) for x in others]
         return ratio if all(are_equal(*pair) for pair in scaled) else None
-
-    def _opposite(self, a: Value, b: Value) -> bool:
-        if a.op == b.op == "number":
-            return a.number == -b.number
-        return self.graph.negative(a) is b or self.graph.negative(b) is a
 
     def _solved_for(self, own: Value, row: Mapping[Value, Value], rest: Value) -> Value:
         """Return the value of a state at which a linear value is 0."""
@@ -286,7 +283,7 @@ class Builder:
     # ---- Forces ----------------------------------------------------------------------------------
 
     def _is(self, contact: Contact, mode: int) -> Value:
-        return self.graph.value("==", contact.mode, self.graph.number(float(mode)))
+        return is_mode(self.graph, contact, mode)
 
     def stuck(self, direction: Direction) -> Value | None:
         """Return whether friction holds a direction; None: it has none."""
@@ -326,8 +323,8 @@ class Builder:
     def _where_active(self, contact: Contact, size: Value) -> Value:
         return size if contact.active is None else self.choice(contact.active, size, self.zero)
 
-    def build(self) -> tuple[Contacts, dict[Value, Value], dict[Value, Value], dict[Value, Value]]:
-        """Return the contacts, forces in rates, forces that are shown, and rates of the states.
+    def build(self) -> tuple[Contacts, dict[Value, Value], dict[Value, Value]]:
+        """Return the contacts, forces as they are shown, and rates of the states.
 
         Who carries a closed stop's direction where friction holds it, too, is shown only: friction
         does as far as it can. In rates it does so alone.
@@ -372,7 +369,7 @@ class Builder:
         self._solve(found, plain)
         in_rates, shown = self._forces(found)
         found.limits += sorted(self._limits(in_rates), key=lambda limit: limit.number)
-        return found, in_rates, shown, self._rates(in_rates)
+        return found, shown, self._rates(in_rates)
 
     def _blocks(self, response: list[list[Value]]) -> list[list[int]]:
         """Return groups of directions whose forces act on each other."""
@@ -484,16 +481,11 @@ class Builder:
         positive = self.graph.value(">", contact.ratio, self.zero)
         if contact.ratio.op == "number":
             return lower if contact.ratio.number > 0 else self.graph.value("not", lower)
-        return self._if_condition(positive, lower, self.graph.value("not", lower))
-
-    def _if_condition(self, condition: Value, first: Value, second: Value) -> Value:
-        graph = self.graph
-        otherwise = graph.value("and", graph.value("not", condition), second)
-        return graph.value("or", graph.value("and", condition, first), otherwise)
+        return self.graph.choice(positive, lower, self.graph.value("not", lower))
 
     def _excess(self, friction: Contact, contact: Contact, hold: Value) -> Value:
         """Return what a stop carries of the force that holds its direction."""
-        graph, limit = self.graph, self.breakaway(friction)
+        graph, limit = self.graph, friction.breakaway
         lower = graph.value("negative", limit)
         above = graph.value(
             "if", graph.value(">", hold, limit), graph.value("-", hold, limit), self.zero
@@ -567,10 +559,10 @@ class Builder:
     def _limits_of_friction(
         self, direction: Direction, contact: Contact, number: int
     ) -> list[Limit]:
-        graph, limit, stuck = self.graph, self.breakaway(contact), self._is(contact, STUCK)
+        graph, limit, stuck = self.graph, contact.breakaway, self._is(contact, STUCK)
         velocity = contact.given["velocity"]
         moves = self.choice(self._is(contact, BACKWARD), graph.negative(velocity), velocity)
-        used, opens = [contact.active, stuck], []
+        opens = []
         for stop in direction.stops:
             positive, is_open = self.is_positive(stop), self._is(stop, FREE)
             opens.append(
@@ -584,7 +576,7 @@ class Builder:
             conditions = [sides_of[i] for sides_of in opens]
             sides.append(reduce(partial(graph.value, "and"), conditions) if conditions else None)
         forward, backward = sides
-        first = used[0]
+        first = contact.active
         if forward is not None:
             own = graph.value("or", graph.value("not", stuck), forward)
             first = own if first is None else graph.value("and", first, own)
@@ -616,6 +608,11 @@ class Builder:
         if b.op == "number" and b.number == -1.0:
             return self.graph.negative(a)
         return self.graph.simple("/", a, b)
+
+
+def is_mode(graph: Graph, contact: Contact, mode: int) -> Value:
+    """Return whether a contact is in a mode."""
+    return graph.value("==", contact.mode, graph.number(float(mode)))
 
 
 def _is_zero(value: Value) -> bool:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..names import OF_VALUES
+from . import contacts
 from .arrays import elements
 from .content import BOOLEAN, INTEGER, ModelFile
 from .include import Source, source_of
@@ -23,7 +24,6 @@ from .keys import FIELD
 
 GROUPS = {"inputs": "inputs", "states": "states", "discrete": "held between events"}
 CALCULATED = ("where", "outputs")  # those without a value are written by C
-CONTACTS = ("friction", "stops")  # their forces are read by C
 RATES = "dx"  # of a file with a hook
 Place = tuple[str | int, ...]  # a field of struct NAME_values, from its name
 
@@ -194,7 +194,7 @@ class Header:
 
 def _forces(file: ModelFile, tables: dict[str, Any]) -> Iterator[str]:
     """Yield the names of the forces of friction and stops."""
-    for section in CONTACTS:
+    for section in contacts.SECTIONS:  # C reads their forces
         given = tables.get(section)
         for key, entry in given.items() if isinstance(given, dict) else ():
             with suppress(Exception):  # what is wrong with it is said where it is read

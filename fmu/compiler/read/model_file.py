@@ -254,7 +254,7 @@ def _solve_contacts(file: ModelFile) -> None:
             contact.given.setdefault("stribeck", graph.number(0.0))
     before = {state.leaf: state.value for state in states}
     try:
-        graph.contacts, _, shown, rates = contacts.Builder(graph, found, before).build()
+        graph.contacts, shown, rates = contacts.Builder(graph, found, before).build()
     except contacts.ContactError as error:
         with placed(f"[{error.contact.name}]", error.key):
             raise ModelFileError(str(error)) from None

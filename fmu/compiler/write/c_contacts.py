@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial, reduce
 from itertools import pairwise
 
-from ..graph.contacts import BACKWARD, FORWARD, FREE, STUCK, Contact, Direction, Limit
+from ..graph.contacts import BACKWARD, FORWARD, FREE, STUCK, Contact, Direction, Limit, is_mode
 from ..graph.graph import Graph, Value
 from ..read.content import ModelFile, variable_of
 from .c_code import Code, Leaves
@@ -73,8 +73,7 @@ def moves_on(file: ModelFile) -> Value | None:
 
 def _is_stuck(graph: Graph, direction: Direction) -> Value:
     """Return whether friction holds a direction, whose limit only parameters move."""
-    given = direction.friction.given
-    if given.get("breakaway", given["coulomb"]).moves or ("time", "") in direction.hold.leaves:
+    if direction.friction.breakaway.moves or ("time", "") in direction.hold.leaves:
         return graph.number(0.0)
     at_rest = graph.value("==", direction.velocity, graph.number(0.0))
     return graph.value("and", is_mode(graph, direction.friction, STUCK), at_rest)
@@ -89,21 +88,16 @@ def surely_held(file: ModelFile, leaves: Leaves) -> list[Item]:
     for direction in file.graph.contacts.directions:
         if not direction.friction or _is_stuck(file.graph, direction).op == "number":
             continue
-        given, code, hold = direction.friction.given, Code(leaves), Place("hold")
+        code, hold = Code(leaves), Place("hold")
         code.statements.append(Statement(("double hold;",)))
         code.assign({hold: direction.hold})
-        most = "*", HELD_SURELY, code.of(given.get("breakaway", given["coulomb"]))
+        most = "*", HELD_SURELY, code.of(direction.friction.breakaway)
         is_below = "<", ("fabs", hold), most
         code.statements.append(Block(("not", is_below), ([Statement(("return false;",))],)))
         outer = Code(leaves)
         is_stuck = outer.of(is_mode(file.graph, direction.friction, STUCK))
         found += [*outer.statements, Block(is_stuck, (code.statements,))]
     return found
-
-
-def is_mode(graph: Graph, contact: Contact, mode: int) -> Value:
-    """Return whether a contact is in a mode."""
-    return graph.value("==", contact.mode, graph.number(float(mode)))
 
 
 def distance(file: ModelFile, limit: Limit) -> Value:
@@ -152,8 +146,13 @@ def compare(
     return stores
 
 
-def parts(file: ModelFile, leaves: Leaves, compared: list[str]) -> dict[str, object]:
-    """Return what events.c.in has of contacts; compared: lines that compare their limits."""
+def parts(
+    file: ModelFile, leaves: Leaves, counted: Sequence[str], compared: list[str]
+) -> dict[str, object]:
+    """Return what events.c.in has of contacts.
+
+    counted: names of struct count. compared: lines that compare limits.
+    """
     found = file.graph.contacts
     if found is None:
         return {"contacts": [], "of_contacts": [], "limits": 0, "room_of_contacts": ", {0}"}
@@ -161,7 +160,7 @@ def parts(file: ModelFile, leaves: Leaves, compared: list[str]) -> dict[str, obj
     states = {x.leaf: i for i, x in enumerate(file.of("states"))}
     text_of = filled(
         "contacts.c.in",
-        contact=[_contact_row(file, contact, states) for contact in found.contacts],
+        contact=[_contact_row(file, contact, states, counted) for contact in found.contacts],
         direction=[_direction_row(file, direction, states) for direction in found.directions],
         moved=", ".join(str(states[x]) for x in found.moved) or "0",
         measure=_measure(file, leaves),
@@ -181,19 +180,18 @@ def parts(file: ModelFile, leaves: Leaves, compared: list[str]) -> dict[str, obj
     }
 
 
-def _contact_row(file: ModelFile, contact: Contact, states: dict[Value, int]) -> str:
-    from .c_events import counted  # it needs this module
-
+def _contact_row(
+    file: ModelFile, contact: Contact, states: dict[Value, int], counted: Sequence[str]
+) -> str:
     direction = next(
         i for i, d in enumerate(file.graph.contacts.directions) if contact in d.contacts
     )
-    numbers = {name: i for i, name in enumerate(counted(file))}
     own = [
         text(contact.name),
         str(contact.is_friction).lower(),
         *(str(key in contact.given).lower() for key in ("lower", "upper")),
         str(direction),
-        str(numbers[variable_of(contact.name, "mode")]),
+        str(counted.index(variable_of(contact.name, "mode"))),
     ]
     if contact.is_friction:
         return f"{{{', '.join([*own, '0', '0', '0', '0'])}}},"
@@ -253,7 +251,7 @@ def _measure(file: ModelFile, leaves: Leaves) -> list[str]:
         if contact.tolerances:
             most = _tolerance(code, contact.tolerances, states)
             sums.append(store(Place("to->tolerance[", e, "]"), most))
-        active = contact.active if contact.active is not None else None
+        active = contact.active
         is_active = "1.0" if active is None else ("if", code.of(active), 1.0, 0.0)
         sums.append(store(Place("to->active[", e, "]"), is_active))
     code.statements += sums
@@ -265,7 +263,7 @@ def _of_contact(file: ModelFile, contact: Contact) -> dict[str, Value]:
     given, graph = contact.given, file.graph
     if contact.is_friction:
         own = {key: given[key] for key in ("coulomb", "stribeck") if key in given}
-        own["breakaway"] = given.get("breakaway", given["coulomb"])
+        own["breakaway"] = contact.breakaway
         return own | {"ratio": contact.ratio, "law": contact.law}
     own = {key: given[key] for key in ("position", "lower", "upper") if key in given}
     own |= {"ratio": contact.ratio, "restitution": given["restitution"]}
@@ -290,7 +288,4 @@ def _tolerance(code: Code, row: Mapping[Value, Value], states: Mapping[Value, in
 
 
 def _sum(terms: Sequence[Operand]) -> Operand:
-    total = terms[0]
-    for term in terms[1:]:
-        total = "+", total, term
-    return total
+    return reduce(lambda total, term: ("+", total, term), terms)

@@ -292,7 +292,7 @@ class Events:
             switches=self._switches(),
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located) + len(self.limits),
-            **c_contacts.parts(file, self.leaves, self._compare_limits()),
+            **c_contacts.parts(file, self.leaves, [*counted(file)], self._compare_limits()),
             next_time=NEXT_TIME if timed or file.sampled else [],
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial, reduce
 from typing import TYPE_CHECKING
 
-from ..graph.contacts import STUCK
+from ..graph.contacts import STUCK, is_mode
 from ..graph.graph import is_number
 from . import c_contacts, c_undefined
 from .c_code import Code
@@ -135,7 +135,7 @@ def _reach(events: Events) -> dict[str, list[str]]:
                                    for x, i in states.items()}))  # fmt: skip
     stores = [store(Place("reach[", i, "]"), "INFINITY") for i in states.values()]
     for direction, friction in falling:
-        given, is_stuck = friction.given, c_contacts.is_mode(graph, friction, STUCK)
+        given, is_stuck = friction.given, is_mode(graph, friction, STUCK)
         falls = graph.value(">", given["breakaway"], given["coulomb"])
         slides = graph.value("not", is_stuck)
         if not _is_of_time(falls):
