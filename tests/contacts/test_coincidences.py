@@ -48,6 +48,11 @@ def run_of(method: str, stop: float = 3.0, **given: object) -> np.ndarray:
     return simulated(fmu, stop, 0.1, start, relative_tolerance=1e-11, also=also)
 
 
+def run_text(text: str, method: str, stop: float, step: float, **options: object) -> np.ndarray:
+    options = {"relative_tolerance": 1e-10} | options
+    return simulated(made(text), stop, step, {"solver_method": METHODS[method]}, **options)
+
+
 def agree(run: np.ndarray, x: Callable, v: Callable) -> None:
     t = run["time"]
     assert run["x"] == pytest.approx(np.vectorize(x)(t), abs=1e-9)
@@ -165,8 +170,7 @@ force = "B"
 velocity = "v2"
 coulomb = "0.5"
 """
-    start = {"solver_method": METHODS[method]}
-    run = simulated(made(text), 4, 0.1, start, relative_tolerance=1e-11)
+    run = run_text(text, method, 4, 0.1, relative_tolerance=1e-11)
     s = np.maximum(np.sqrt(0.5), run["time"] - 1)
     v = (s**3 / 3 - s / 2 + np.sqrt(0.5) / 3) / 2
     assert run["v1"] == pytest.approx(v, abs=1e-9) and run["v2"] == pytest.approx(v, abs=1e-9)
@@ -207,8 +211,7 @@ w = { derivative = "Q + 3" }
 a = { force = "P", position = "x", velocity = "v", lower = "-0.02", restitution = "0" }
 b = { force = "Q", position = "y", velocity = "w", upper = "0", restitution = "0" }
 """
-    start = {"solver_method": METHODS[method]}
-    end = simulated(made(text), 1, 0.1, start, relative_tolerance=1e-11)[-1]
+    end = run_text(text, method, 1, 0.1, relative_tolerance=1e-11)[-1]
     for name, way, sign in (("a", 0.02, 1), ("b", 0.1, -1)):
         assert end[f"stops.{name}.impulse"] == pytest.approx(sign * np.sqrt(6 * way), abs=1e-9)
 
@@ -235,8 +238,7 @@ velocity = "w + 0.5 * v"
 upper = "0.1"
 restitution = "0"
 """
-    start = {"solver_method": METHODS[method]}
-    end = simulated(made(text), 2, 0.01, start, relative_tolerance=1e-10)[-1]
+    end = run_text(text, method, 2, 0.01)[-1]
     assert [end["x"], end["y"]] == pytest.approx([1.158, -0.479], abs=1e-9)
     assert [end["v"], end["w"]] == pytest.approx([0, 0], abs=1e-12)
     assert [end["stops.a.force"], end["stops.b.force"]] == pytest.approx([2, -2])
@@ -258,9 +260,8 @@ force = "G"
 velocity = "v1 + v2"
 coulomb = "2"
 """
-    start = {"solver_method": METHODS[method]}
     also = ["event_count", "last_event_time"]
-    run = simulated(made(text), 3, 0.01, start, relative_tolerance=1e-10, also=also)
+    run = run_text(text, method, 3, 0.01, also=also)
     times = np.unique(run["last_event_time"][run["event_count"] > 0])
     assert times[:3] == pytest.approx([0.263984, 0.487271, 0.763129], abs=1e-6)
     assert run["event_count"][-1] == 12
@@ -286,8 +287,7 @@ force = "F"
 velocity = "v"
 coulomb = "2"
 """
-    start = {"solver_method": METHODS[method]}
-    run = simulated(made(text), 3, 0.01, start, relative_tolerance=1e-10, also=["event_count"])
+    run = run_text(text, method, 3, 0.01, also=["event_count"])
     end = run[-1]
     assert [end["v"], end["w"], end["friction.a.mode"], end["event_count"]] == [0, 0, STUCK, 2]
     forces = [end["friction.a.force"], end["stops.a.force"]]
