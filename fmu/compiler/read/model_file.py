@@ -18,6 +18,7 @@ from ..names import Fields, StructFields
 from ..plain_c.memory import is_real
 from ..plain_c.text import CTextError
 from . import file as file_reader
+from . import gradients
 from .code import Calls
 from .components import all_parts
 from .content import (
@@ -59,14 +60,6 @@ def read(path: Path) -> ModelFile:
     graph = Graph(tables=file.tables, has_switches=has_switches, is_guarded=is_exact)
     file.graph, calls = graph, Calls(file.code.program, graph, is_exact) if file.code else None
     known = leaves(file, graph)
-    counts = [v.name for v in file.of(COUNTS)]
-    calculated = [v.name for v in file.calculated]
-    sections = ("parameters", "inputs", "states", "discrete", OPTIONS, SWITCHES)
-    names = [[v.name for v in file.of(section)] for section in sections]
-    file.fields = Fields([*names, calculated, [*file.modes, *counts]])
-    if file.hook:
-        states = [v.name for v in file.of("states")]
-        file.fields = StructFields(file.header.places, RATES, states)
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known["pi"] = graph.number(math.pi)
     if calls:
@@ -113,6 +106,10 @@ def read(path: Path) -> ModelFile:
     if file.contacts:
         with file_reader.located(path, file.text):
             _solve_contacts(file)
+    if file.gradients:
+        with file_reader.located(path, file.text):
+            gradients.add(file)
+    file.fields = _fields(file)
     for variable in file.of(*CALCULATED):
         if variable.variability and variable.value.moves:
             moving = sorted(name or op for op, name in variable.value.leaves if op in MOVING)
@@ -138,6 +135,17 @@ def read(path: Path) -> ModelFile:
         for name, node, place in zip(graph.relations, graph.nodes, places, strict=True)
     ]
     return file
+
+
+def _fields(file: ModelFile) -> Fields | StructFields:
+    """Return where the struct of values has the variables."""
+    if file.hook:
+        states = [v.name for v in file.of("states")]
+        return StructFields(file.header.places, RATES, states)
+    sections = ("parameters", "inputs", "states", "discrete", OPTIONS, SWITCHES)
+    names = [[v.name for v in file.of(section)] for section in sections]
+    calculated = [v.name for v in file.calculated]
+    return Fields([*names, calculated, [*file.modes, *(v.name for v in file.of(COUNTS))]])
 
 
 class Blocks:
