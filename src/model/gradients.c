@@ -112,6 +112,19 @@ static void add_time_events(const struct call *call) {
     }
 }
 
+/* Adds limits of friction and stops that are met. */
+static void add_limits(const struct call *call, const struct event *event) {
+    const struct contacts *contacts = call->model->contacts;
+    const int count = contacts != NULL ? 2 * contacts->contact_count : 0;
+    for (int i = 0; i < count; i++) {
+        const int place = call->model->relation_count + i;
+        if (event->triggered[contacts->indicator + (size_t)i] &&
+            !(event->du_is_known && crossing_of(call, place).slope > 0.0)) {
+            add_crossing(call, place);
+        }
+    }
+}
+
 /* Adds the rates, times the shifts and the sign, to the gradients of all states. */
 static void move(const struct call *call, const double rate[], double sign) {
     const struct gradients *gradients = call->model->gradients;
@@ -138,10 +151,12 @@ void gradients_depart(const struct call *call, const struct event *event) {
         const bool turns = call->room.turned[k] != 0;
         if (turns && gradients->watched[k] >= 0) {
             look_at_turn(call, gradients->watched[k]);
-        } else if (turns && call->room.compared[k].used) {
+        }
+        if (turns && k < gradients->relation_count && call->room.compared[k].used) {
             add_crossing(call, k);
         }
     }
+    add_limits(call, event);
     move(call, room->rate, 1.0);
 }
 

@@ -31,11 +31,13 @@ struct gradients {
     int state_count;          /* of the model without gradients, which come first */
     size_t are_exact;         /* offset of an int */
     const double *size;       /* of a change of each parameter that is not small */
-    const char *const *names; /* of relations */
+    const char *const *names; /* of relations, then of the limits of contacts */
+    int relation_count;       /* those of the model; behind them slopes are compared with 0 */
     const int *watched; /* of each relation: the one whose slope it compares with 0; -1: none */
 
     /* Writes the rates of the states. */
     void (*rates)(const void *values, double t, double rate[]);
+    /* Writes how the distance of a relation, or behind them of a limit of contacts, moves. */
     void (*cross)(const void *values, double t, const double du[], int relation,
                   struct crossing *to);
     /* Writes derivatives of the time of a sampler's next tick by each parameter. */

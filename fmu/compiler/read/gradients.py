@@ -12,10 +12,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..expressions.expression import Node
+from ..expressions.expression import RELATIONS, Node
 from ..expressions.hints import meant
 from ..expressions.kinds import CONDITION
-from ..graph.graph import Graph, Relation, Value
+from ..graph.graph import Graph, Value
 from ..units import Exponents
 from . import keys
 from .content import (
@@ -33,7 +33,6 @@ from .content import (
 ARE_EXACT = "gradients_are_exact"
 START = re.compile(r"start\(\s*(.+?)\s*\)")
 SHIFT = "shift"  # leaf: derivative of the time of an event
-CONTINUOUS = ("abs", "min", "max")  # switch where both branches are equal
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,9 @@ class Gradients:
     # derivatives of variables, in the order of `by`
     states: dict[Value, list[Value]] = field(default_factory=dict)  # by their leaves
     discrete: dict[Value, list[Value]] = field(default_factory=dict)
-    watched: dict[str, str] = field(default_factory=dict)  # slopes that turn, of relations
+    # relations of slopes with 0, and the relations whose distances have these slopes
+    watched: dict[str, str] = field(default_factory=dict)
+    relations: int = 0  # of the file; those of slopes follow
 
     def seeds(
         self, graph: Graph, i: int, at_event: Iterable[Value] | None = None
@@ -176,6 +177,29 @@ def add(file: ModelFile) -> None:
                 text = f"derivative of {name} by {by.shown}"
                 change.gradients[made.name] = _expression(made, value, text)
     _add_flag(file)
+    _watch(file)
+
+
+def _watch(file: ModelFile) -> None:
+    """Compare slopes of distances with 0, where these turn before a relation switches.
+
+    abs, min and max need none: both branches are equal where they switch.
+    """
+    graph, texts = file.graph, file.relation_texts
+    motion = {x.leaf: x.value for x in file.of("states") if x.leaf in file.gradients.states}
+    motion |= {graph.value("time"): graph.number(1.0)}
+    pairs = [*zip(graph.relations.values(), graph.nodes, texts, strict=True)]
+    file.gradients.relations = len(pairs)
+    for relation, node, text in pairs:
+        if node.op not in RELATIONS or relation.time is not None:
+            continue
+        (slope,) = graph.derivatives([relation.distance], motion)
+        if slope.moves:
+            mode = graph.switch(">", slope, graph.number(0.0))
+            file.gradients.watched.setdefault(mode.name, relation.name)
+        if len(texts) < len(graph.relations):
+            graph.nodes.append(node)
+            texts.append(f"slope of {text}")
 
 
 def _is_wanted(gradients: Gradients, variable: Variable) -> bool:

@@ -106,10 +106,6 @@ def read(path: Path) -> ModelFile:
     if file.contacts:
         with file_reader.located(path, file.text):
             _solve_contacts(file)
-    if file.gradients:
-        with file_reader.located(path, file.text):
-            gradients.add(file)
-    file.fields = _fields(file)
     for variable in file.of(*CALCULATED):
         if variable.variability and variable.value.moves:
             moving = sorted(name or op for op, name in variable.value.leaves if op in MOVING)
@@ -122,9 +118,6 @@ def read(path: Path) -> ModelFile:
                 if name not in file.variables:
                     way_out = meant(name, file.variables)
                     raise ModelFileError(f"terminate: {{{name}}}: no such variable{way_out}")
-    own = {state.value: f"der_{state.name}" for state in reversed(file.of("states"))}
-    own |= {variable.value: variable.name for variable in reversed(file.calculated)}
-    graph.names |= {value: name for value, name in own.items() if value.arguments}
     places = [source.place for source in sources]
     file.relation_texts = [
         in_c[name]
@@ -134,6 +127,13 @@ def read(path: Path) -> ModelFile:
         else f"{_shown(node)} of {' '.join(place[:2])}"
         for name, node, place in zip(graph.relations, graph.nodes, places, strict=True)
     ]
+    if file.gradients:
+        with file_reader.located(path, file.text):
+            gradients.add(file)
+    file.fields = _fields(file)
+    own = {state.value: f"der_{state.name}" for state in reversed(file.of("states"))}
+    own |= {variable.value: variable.name for variable in reversed(file.calculated)}
+    graph.names |= {value: name for value, name in own.items() if value.arguments}
     return file
 
 

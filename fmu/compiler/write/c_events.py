@@ -176,6 +176,9 @@ class Events:
         for segment in graph.segments.values():
             readers |= {segment.low.name: segment.leaf, segment.high.name: segment.leaf}
         self.used = {name: used.get(reader, graph.number(0.0)) for name, reader in readers.items()}
+        if file.gradients:  # slopes matter where their relations do
+            own = [*self.used][file.gradients.relations :]
+            self.used |= {slope: self.used[file.gradients.watched[slope]] for slope in own}
         self.located = graph.located
 
     def __bool__(self) -> bool:

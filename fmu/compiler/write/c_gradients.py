@@ -5,9 +5,10 @@ from __future__ import annotations
 from functools import reduce
 from typing import TYPE_CHECKING
 
-from ..graph.graph import Relation, Value
+from ..graph.graph import Value
 from ..read.content import ModelFile
 from ..read.gradients import ARE_EXACT
+from . import c_contacts
 from .c_code import Code
 from .c_text import filled, indented, text
 from .statements import Operand, Place, store
@@ -25,16 +26,20 @@ def parts(events: Events) -> dict[str, object]:
         return NONE
     by, states = file.gradients.by, [*file.gradients.states]
     names = [*file.graph.relations]
+    limits = [f"{limit.contact}.{limit.key}" for limit in events.limits]
+    distances = [relation.distance for relation in events.relations]
+    distances += [c_contacts.distance(file, limit) for limit in events.limits]
     watched = [names.index(file.gradients.watched[r]) if r in file.gradients.watched else -1
                for r in names]  # fmt: skip
     found = filled(
         "gradients.c.in",
         size=", ".join(repr(given.size) for given in by),
-        names=", ".join(text(name[:100]) for name in file.relation_texts) or "NULL",
+        names=", ".join(text(name[:100]) for name in [*file.relation_texts, *limits]) or "NULL",
+        relations=file.gradients.relations,
         watched=", ".join(map(str, watched)) or "-1",
         rates=_rates(events),
-        crossings=[line for i, relation in enumerate(events.relations)
-                   for line in _crossing(events, i, relation)],
+        crossings=[line for i, distance in enumerate(distances)
+                   for line in _crossing(events, i, distance)],
         ticks=_ticks(events),
         count=len(by),
         states=len(states),
@@ -62,8 +67,8 @@ def _rates(events: Events) -> list[str]:
     return code.assign({Place("rate[", i, "]"): x.value for i, x in enumerate(states)}).lines()
 
 
-def _crossing(events: Events, index: int, relation: Relation) -> list[str]:
-    """How the distance of a relation moves by the time and by each parameter."""
+def _crossing(events: Events, index: int, distance: Value) -> list[str]:
+    """How a distance moves by the time and by each parameter."""
     file, graph = events.file, events.graph
     gradients, inputs = file.gradients, file.of("inputs")
     code = Code(events.leaves.but(shifts(file)))
@@ -71,10 +76,10 @@ def _crossing(events: Events, index: int, relation: Relation) -> list[str]:
     motion |= {graph.value("time"): graph.number(1.0)}
     motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
     parameters = {by.variable.leaf for by in gradients.by if not by.is_start}
-    (slopes,) = graph.gradients([relation.distance], [*motion, *gradients.discrete, *parameters])
+    (slopes,) = graph.gradients([distance], [*motion, *gradients.discrete, *parameters])
     terms = [graph.simple("*", slope, motion[x]) for x, slope in slopes.items() if x in motion]
     slope, size = _sums(events, code, terms)
-    (whole,) = graph.derivatives([relation.distance], motion)
+    (whole,) = graph.derivatives([distance], motion)
     (curvature,) = graph.derivatives([whole], motion)
     stores = [store("to->slope", slope), store("to->size", size)]
     stores.append(store("to->curvature", code.of(curvature)))
