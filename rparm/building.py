@@ -67,7 +67,8 @@ def build(
         kept, *fmus = _kept(Path(file), runtimes, of_this_machine, gradients, work, notes=lock)
         paths = Path(output) / fmus[0], Path(output) / fmus[1]
         # the cache may have it from a file of another name
-        made = {_lock(Path(file)): work / kept} if lock else {}
+        keeps = lock and not gradients  # which are not of the file
+        made = {_lock(Path(file)): work / kept} if keeps else {}
         _put(made | dict(zip(paths, (work / name for name in fmus), strict=True)))
     return paths
 
