@@ -235,6 +235,9 @@ enum status contacts_update(const struct call *call, const struct event *event, 
     if (contacts_break_away(&work)) {
         write_modes(&work);
     }
+    if (work.model->hold_gradients != NULL) {
+        work.model->hold_gradients(&work);
+    }
     *changes |= work.jumps;
     for (int e = 0; e < work.model->contact_count; e++) {
         *changes |= work.modes[e] != *mode_of(&work, e);

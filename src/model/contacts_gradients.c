@@ -57,3 +57,46 @@ void contacts_strike_gradients(const struct work *work, const double P[], const 
         }
     }
 }
+
+/* Moves the states by impulses, as push of contacts_impacts.c does. */
+static void push(const struct work *work, int k, double impulse, double gradient[]) {
+    const int friction = work->friction[k];
+    const int e = friction >= 0 ? friction : work->stop[k];
+    const double own = friction >= 0 ? -impulse : impulse / work->now.ratio[e];
+    for (int i = 0; i < work->model->moved_count; i++) {
+        gradient[work->model->moved[i]] += work->now.jump[i * work->model->contact_count + e] * own;
+    }
+}
+
+void contacts_hold_gradients(const struct work *work) {
+    const struct call *call = work->call;
+    const struct contacts *model = work->model;
+    const struct gradients *gradients = call->model->gradients;
+    const int count = model->direction_count;
+    double *change = call->room.gradients.contacts, *of_P = change + count;
+    const struct contacts_measured along = contacts_measured_in(model, of_P + count);
+    for (int k = 0; k < count; k++) {
+        work->marked[k] = work->rests[k] && work->pattern[k] == 0;
+    }
+    for (int j = 0; j < gradients->count; j++) {
+        double *gradient = states_of(work) + (1 + j) * gradients->state_count;
+        model->measure_along(call->values, call->t, call->du, call->room.gradients.shift, j,
+                             &along);
+        for (int k = 0; k < count; k++) {
+            change[k] = -along.velocity[k];
+        }
+        contacts_solve_impulses(work, work->marked, change, of_P);
+        for (int k = 0; k < count; k++) {
+            if (work->marked[k]) {
+                push(work, k, of_P[k], gradient);
+            }
+        }
+        for (int e = 0; e < model->contact_count; e++) {
+            const int mode = *mode_of(work, e);
+            if (!model->contact[e].is_friction && mode != STOPS_FREE) {
+                gradient[model->contact[e].position] =
+                    mode == STOPS_LOWER ? along.at_lower[e] : along.at_upper[e];
+            }
+        }
+    }
+}

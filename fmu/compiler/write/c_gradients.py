@@ -83,7 +83,7 @@ def along(file: ModelFile, leaves: Leaves) -> dict[str, list[str]]:
             values |= of
     for e, contact in enumerate(found.contacts):
         own = c_contacts.of_contact(file, contact)
-        keys = [key for key in ("ratio", "restitution") if key in own]
+        keys = [key for key in ("ratio", "restitution", "at_lower", "at_upper") if key in own]
         values |= {Place(f"to->{key}[", e, "]"): own[key] for key in keys}
     lines, inputs = [], [u.leaf for u in file.of("inputs")]
     for j in range(len(gradients.by)):
@@ -101,7 +101,7 @@ def along(file: ModelFile, leaves: Leaves) -> dict[str, list[str]]:
         "    (void)shift;",
     ]
     members = [".measure_along = measure_along,"]
-    members.append(".strike_gradients = contacts_strike_gradients,")
+    members += [f".{name}_gradients = contacts_{name}_gradients," for name in ("strike", "hold")]
     return {"measure_along": [*head, *indented(lines), "}", ""], "of_gradients": members}
 
 
