@@ -248,11 +248,6 @@ struct model {
                             double J[]);
     const struct band *band; /* NULL: of the full Jacobian */
 
-    /* Number of parameters by which the gradients of the states are states, too: behind the states
-     * follows a copy of them for each. All copies have the Jacobian of the states, which is all
-     * that jacobian writes; their derivatives by the states may be anything. */
-    size_t gradient_count;
-
     /* Taylor series of the states. NULL if the model offers none: only a model whose right-hand
      * side has all derivatives everywhere may offer one. */
     const struct series *series;
@@ -291,4 +286,9 @@ struct model {
     /* Expressions of calculated fields; NULL if the model has no file. */
     const struct expression *expressions;
     size_t expression_count;
+
+    /* Number of parameters by which the gradients of the states are states, too: behind the states
+     * follows a copy of them for each. All copies have the Jacobian of the states, which is all
+     * that jacobian writes; their derivatives by the states may be anything. */
+    size_t gradient_count;
 };
