@@ -57,7 +57,7 @@ static bool is_within_reach(const struct call *call, const struct crossing *cros
 }
 
 /* Adds a relation that comes to its limit. */
-static void add_crossing(const struct call *call, int relation) {
+static void add_crossing(const struct call *call, const struct event *event, int relation) {
     const struct gradients *gradients = call->model->gradients;
     struct departure *departure = call->room.gradients.departure;
     struct crossing found = crossing_of(call, relation);
@@ -66,6 +66,9 @@ static void add_crossing(const struct call *call, int relation) {
     const double depth = turns ? 0.5 * found.slope * found.slope / fabs(found.curvature) : INFINITY;
     if (is_flat || is_within_reach(call, &found, depth)) {
         departure->doubtful = gradients->names[relation];
+    }
+    if (found.is_of_input && !event->du_is_known) {
+        departure->driven = gradients->names[relation];
     }
     for (int j = 0; j < gradients->count; j++) {
         found.by[j] = is_flat ? 0.0 : -found.by[j] / found.slope;
@@ -95,14 +98,14 @@ static void add_tick(const struct call *call, int sampler) {
 }
 
 /* Adds time events that come now. */
-static void add_time_events(const struct call *call) {
+static void add_time_events(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
     model->write_times(call->values, call->room.times);
     for (int k = 0; k < call->relation_count; k++) {
         const bool has_passed = call->room.times[k] <= call->passed;
         if (model->relation[k].is_timed &&
             (has_passed == model->relation[k].rises) != call->holds[k]) {
-            add_crossing(call, k);
+            add_crossing(call, event, k);
         }
     }
     for (int i = 0; i < model->sampler_count; i++) {
@@ -120,7 +123,7 @@ static void add_limits(const struct call *call, const struct event *event) {
         const int place = call->model->relation_count + i;
         if (event->triggered[contacts->indicator + (size_t)i] &&
             !(event->du_is_known && crossing_of(call, place).slope > 0.0)) {
-            add_crossing(call, place);
+            add_crossing(call, event, place);
         }
     }
 }
@@ -146,14 +149,14 @@ void gradients_depart(const struct call *call, const struct event *event) {
     }
     room->departure->has_departed = true;
     gradients->rates(call->values, call->t, room->rate);
-    add_time_events(call);
+    add_time_events(call, event);
     for (int k = 0; k < call->relation_count; k++) {
         const bool turns = call->room.turned[k] != 0;
         if (turns && gradients->watched[k] >= 0) {
             look_at_turn(call, gradients->watched[k]);
         }
         if (turns && k < gradients->relation_count && call->room.compared[k].used) {
-            add_crossing(call, k);
+            add_crossing(call, event, k);
         }
     }
     add_limits(call, event);
@@ -163,18 +166,26 @@ void gradients_depart(const struct call *call, const struct event *event) {
 /* Writes once from when on the gradients are not exact, and why. */
 static void note_doubt(const struct call *call, const struct event *event) {
     const struct departure *departure = call->room.gradients.departure;
-    int *are_exact = exactness_of(call);
     const char *touched = departure->missed != NULL ? departure->missed : departure->doubtful;
-    if (*are_exact && event->note != NULL && touched != NULL) {
+    int *are_exact = exactness_of(call);
+    if (!*are_exact || event->note == NULL) {
+        *are_exact = 0;
+        return;
+    }
+    *are_exact = 0;
+    if (touched != NULL) {
         (void)snprintf(event->note, event->note_size,
                        "%.100s: it is only touched, and another parameter may let it happen or not",
                        touched);
-    } else if (*are_exact && event->note != NULL) {
+    } else if (departure->other != NULL) {
         (void)snprintf(event->note, event->note_size,
                        "%.100s and %.100s come at once, and another parameter changes their order",
                        departure->cause, departure->other);
+    } else {
+        (void)snprintf(event->note, event->note_size,
+                       "%.100s: inputs take part, and in Model Exchange their motion is not known",
+                       departure->driven);
     }
-    *are_exact = 0;
 }
 
 void gradients_arrive(const struct call *call, const struct event *event) {
@@ -194,7 +205,8 @@ void gradients_arrive(const struct call *call, const struct event *event) {
         const double size = fabs(before[i]) + fabs(after[i]);
         jumps |= fabs(after[i] - before[i]) > no_jump * size;
     }
-    const bool is_doubtful = departure->doubtful != NULL || departure->other != NULL;
+    const bool is_doubtful =
+        departure->doubtful != NULL || departure->other != NULL || departure->driven != NULL;
     if (departure->missed != NULL || (jumps && is_doubtful)) {
         note_doubt(call, event);
     }

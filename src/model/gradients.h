@@ -22,6 +22,7 @@ struct crossing {
     double slope;     /* derivative by the time, 1/s */
     double size;      /* sum of the magnitudes of its terms */
     double curvature; /* second derivative by the time, 1/s2 */
+    bool is_of_input; /* true if inputs take part */
     double *by;       /* derivative by each parameter, at a fixed time */
     double *sizes;    /* of each: sum of the magnitudes of its terms */
 };
@@ -56,6 +57,7 @@ struct departure {
     const char *other;    /* one at the same instant whose time changes in another way */
     const char *doubtful; /* one that another parameter would let vanish */
     const char *missed;   /* one that another parameter would let happen */
+    const char *driven;   /* one that inputs move, whose motion is not known */
 };
 
 /* Memory for one call. */

@@ -127,6 +127,8 @@ def _crossing(events: Events, index: int, distance: Value) -> list[str]:
     (curvature,) = graph.derivatives([whole], motion)
     stores = [store("to->slope", slope), store("to->size", size)]
     stores.append(store("to->curvature", code.of(curvature)))
+    if any(u.leaf in slopes for u in inputs):
+        stores.append(store("to->is_of_input", "true"))
     for j in range(len(gradients.by)):
         seeds = gradients.seeds(graph, j)
         terms = [graph.simple("*", of, seeds[x]) for x, of in slopes.items() if x in seeds]
