@@ -99,8 +99,9 @@ static bool create_fixed_point_iteration(struct cvode *cvode) {
 
 static bool create_newton_iteration(struct cvode *cvode) {
     SUNContext context = cvode->base.context;
-    const struct band *band = cvode->base.problem->ode.band;
-    const sunindextype n = (sunindextype)cvode->base.problem->ode.state_count;
+    const struct ode *ode = &cvode->base.problem->ode;
+    const struct band *band = ode->band;
+    const sunindextype n = (sunindextype)ode_count_without_gradients(ode);
     cvode->jacobian = band != NULL ? band->solver->create_matrix(band, n, context)
                                    : SUNDenseMatrix(n, n, context);
     // the solvers work with any vector that has an array, but take only a serial one for pattern
@@ -111,6 +112,9 @@ static bool create_newton_iteration(struct cvode *cvode) {
     cvode->linear_solver = band != NULL ? band->solver->create(band, pattern, cvode->jacobian)
                                         : SUNLinSol_Dense(pattern, cvode->jacobian, context);
     N_VDestroy(pattern);
+    if (cvode->linear_solver != NULL && ode->gradient_count > 0) {
+        cvode->linear_solver = sundials_column_solver(cvode->linear_solver, n);
+    }
     cvode->nonlinear_solver = SUNNonlinSol_Newton(cvode->base.x, context);
     return cvode->linear_solver != NULL && cvode->nonlinear_solver != NULL &&
            CVodeSetNonlinearSolver(cvode->solver, cvode->nonlinear_solver) == CV_SUCCESS &&

@@ -215,6 +215,7 @@ enum status sundials_warm_up(void *memory) {
                 .rhs = rest_rhs,
                 .jacobian = rest_jacobian,
                 .band = wanted.ode.band,
+                .gradient_count = wanted.ode.gradient_count,
                 .context = &state_count},
         .sink = wanted.sink,
         .settings = {.relative_tolerance = 1e-3,
