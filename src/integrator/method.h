@@ -36,13 +36,20 @@ static inline bool problem_ask_observer(const struct problem *problem, double t,
     return problem->observer(problem->observer_context, t, x);
 }
 
-/* True if all values are finite: 0 x is 0 for finite values only. */
+/* True if all values are finite: 0 x is 0 for finite values only. Four sums do not wait for each
+ * other. */
 static inline bool problem_are_finite(const double values[], size_t count) {
-    double sum = 0.0;
-    for (size_t i = 0; i < count; i++) {
-        sum += 0.0 * values[i];
+    double sum[4] = {0.0};
+    size_t i = 0;
+    for (; i + 4 <= count; i += 4) {
+        for (size_t k = 0; k < 4; k++) {
+            sum[k] += 0.0 * values[i + k];
+        }
     }
-    return sum == 0.0;
+    for (; i < count; i++) {
+        sum[0] += 0.0 * values[i];
+    }
+    return sum[0] + sum[1] + (sum[2] + sum[3]) == 0.0;
 }
 
 /* Notes that the equations cannot be evaluated at t and x. */

@@ -20,6 +20,13 @@
  * three times the error if steps are long. */
 static const double adams_iteration_error = 0.2;
 
+/* Error that Newton's iteration may leave with gradients, relative to the error test, where CVODE
+ * allows 0.1. A first iteration does not know how the gradients' rates depend on the states, and
+ * the error test counts what it leaves: measured over stiff models with 1 to 20 gradients, 0.03
+ * takes up to 30 % fewer steps and a quarter less time, or 3 % more; 0.01 costs up to 9 % where it
+ * does not help. */
+static const double newton_iteration_error_of_gradients = 0.03;
+
 /* Largest growth of the step after the first one: after an event it does not outgrow the order
  * (first_step_fraction_after_event); otherwise CVODE's own. */
 static const double growth_after_event = 10.0;
@@ -99,8 +106,9 @@ static bool create_fixed_point_iteration(struct cvode *cvode) {
 
 static bool create_newton_iteration(struct cvode *cvode) {
     SUNContext context = cvode->base.context;
-    const struct band *band = cvode->base.problem->ode.band;
-    const sunindextype n = (sunindextype)cvode->base.problem->ode.state_count;
+    const struct ode *ode = &cvode->base.problem->ode;
+    const struct band *band = ode->band;
+    const sunindextype n = (sunindextype)ode_count_without_gradients(ode);
     cvode->jacobian = band != NULL ? band->solver->create_matrix(band, n, context)
                                    : SUNDenseMatrix(n, n, context);
     // the solvers work with any vector that has an array, but take only a serial one for pattern
@@ -111,6 +119,10 @@ static bool create_newton_iteration(struct cvode *cvode) {
     cvode->linear_solver = band != NULL ? band->solver->create(band, pattern, cvode->jacobian)
                                         : SUNLinSol_Dense(pattern, cvode->jacobian, context);
     N_VDestroy(pattern);
+    if (cvode->linear_solver != NULL && ode->gradient_count > 0) {
+        cvode->linear_solver = sundials_column_solver(cvode->linear_solver, n);
+        (void)CVodeSetNonlinConvCoef(cvode->solver, newton_iteration_error_of_gradients);
+    }
     cvode->nonlinear_solver = SUNNonlinSol_Newton(cvode->base.x, context);
     return cvode->linear_solver != NULL && cvode->nonlinear_solver != NULL &&
            CVodeSetNonlinearSolver(cvode->solver, cvode->nonlinear_solver) == CV_SUCCESS &&

@@ -13,8 +13,8 @@
  * step. context: the pointer in struct ode. */
 typedef enum status ode_rhs(double t, const double x[], double dx[], void *context);
 
-/* Writes the Jacobian of f: J[i + state_count j] is the derivative of f_i by x_j, or as a
- * band (model.h). Otherwise like ode_rhs. */
+/* Writes the Jacobian of f without gradients: J[i + n j] is the derivative of f_i by x_j, or as a
+ * band (model.h). n: ode_count_without_gradients. Otherwise like ode_rhs. */
 typedef enum status ode_jacobian(double t, const double x[], double J[], void *context);
 
 /* Writes the Taylor coefficients of orders first to last of the solution through rows[i][0] at the
@@ -49,14 +49,21 @@ struct ode {
     size_t series_row_count;   /* >= state_count if there is a series */
     ode_settle *settle;        /* called after some internal steps; NULL if nothing depends on it */
     bool may_end; /* true if solutions may end: then a method does not creep up to such an end */
-    size_t state_count; /* > 0 */
+    size_t gradient_count; /* copies of the states behind them, as in struct model */
+    size_t state_count;    /* > 0, with all copies */
     void *context;
 };
+
+/* Returns the number of states that are no gradients of others. */
+static inline size_t ode_count_without_gradients(const struct ode *ode) {
+    return ode->state_count / (1 + ode->gradient_count);
+}
 
 /* Returns the number of elements of J. */
 static inline size_t ode_jacobian_size(const struct ode *ode) {
     const struct band *band = ode->band;
-    return ode->state_count * (band == NULL ? ode->state_count : 2 * band->lower + band->upper + 1);
+    const size_t n = ode_count_without_gradients(ode);
+    return n * (band == NULL ? n : 2 * band->lower + band->upper + 1);
 }
 
 /* List of all methods: the code, whose number is the value of solver_method, and the struct method

@@ -111,20 +111,30 @@ ALWAYS_INLINE double weighted_norm(sunindextype n, const double *x, const double
     return sqrt(sum / (double)n);
 }
 
-/* Writes z = sum c[k] X[k]; z may be one of X. Proceeds element by element, so that sums stay in
- * registers. */
+/* Writes the n <= 8 elements from begin on of linear_combination. */
+ALWAYS_INLINE void combine_few(sunindextype n, int count, const double *c, N_Vector *X,
+                               sunindextype begin, double *z) {
+    double sum[8];
+    scale(n, c[0], small_vector_data(X[0]) + begin, sum);
+    for (int k = 1; k < count; k++) {
+        linear_sum(n, 1.0, sum, c[k], small_vector_data(X[k]) + begin, sum);
+    }
+    scale(n, 1.0, sum, z + begin);
+}
+
+/* Writes z = sum c[k] X[k]; z may be one of X. Proceeds by few elements or one, so that sums stay
+ * in registers. */
 ALWAYS_INLINE void linear_combination(sunindextype n, int count, const double *c, N_Vector *X,
                                       double *z) {
     if (n <= 4) {
-        double sum[4];
-        scale(n, c[0], small_vector_data(X[0]), sum);
-        for (int k = 1; k < count; k++) {
-            linear_sum(n, 1.0, sum, c[k], small_vector_data(X[k]), sum);
-        }
-        scale(n, 1.0, sum, z);
+        combine_few(n, count, c, X, 0, z);
         return;
     }
-    for (sunindextype i = 0; i < n; i++) {
+    sunindextype begin = 0;
+    for (; begin + 8 <= n; begin += 8) {
+        combine_few(8, count, c, X, begin, z);
+    }
+    for (sunindextype i = begin; i < n; i++) {
         double sum = c[0] * small_vector_data(X[0])[i];
         for (int k = 1; k < count; k++) {
             sum += c[k] * small_vector_data(X[k])[i];

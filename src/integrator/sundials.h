@@ -24,6 +24,11 @@ struct band_solver {
     SUNLinearSolver (*create)(const struct band *band, N_Vector pattern, SUNMatrix A);
 };
 
+/* Returns a solver of all columns of n elements of a vector with the solver of one column, which it
+ * owns; NULL if memory is short. */
+MUST_CHECK NONNULL SUNLinearSolver sundials_column_solver(SUNLinearSolver of_column,
+                                                          sunindextype n);
+
 /* Returns the number of bytes for the context and the largest method, the one with matrices. */
 size_t sundials_memory_size(const struct ode *ode);
 

@@ -18,6 +18,7 @@ from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 
+import by_gradients
 import by_models
 from by_heyoka import Peer, Work
 from solvers import MUJOCO_IMPLICITFAST, MUJOCO_RK4, PLAIN_LOOP, Solvers
@@ -87,6 +88,7 @@ GROUPS = {
     "steps": ("Communication steps", ("us", "ratio", "error")),
     "against": ("One against another", ("ratio", "error", "error_of_peer")),
     "models": ("Models in equations", ("us", "ratio", "error", "error_of_peer")),
+    "gradients": ("Gradients, 10 masses, in runs without", ("us", "ratio")),
     "plant": ("Friction and stops, steps of 1 ms", ("us", "ratio", "events")),
     "life": ("An instance", ("us", "kib")),
 }
@@ -417,6 +419,7 @@ def main() -> None:
     rows = take_rounds([*peers, *make_peers(rows_of(peers))], options.rounds)
     print("an instance, friction and stops, models in equations", file=sys.stderr)
     rows += by_models.rows(options.repeats, solvers.library)
+    rows += by_gradients.rows(options.repeats)
     rows += plant_rows(solvers, options.repeats) + life_rows(solvers, options.repeats)
     result = {
         "machine": about | {"loops": solvers.made_by, "MuJoCo": solvers.mujoco_version},

@@ -10,6 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import by_gradients
 import by_models
 import compare
 from solvers import Solvers
@@ -33,7 +34,7 @@ def rows(solvers: Solvers) -> list[dict]:
 
 def test_all_methods_and_peers_have_their_rows(rows: list[dict], solvers: Solvers) -> None:
     assert solvers.mujoco_version, "MuJoCo is a requirement of the tests"
-    assert {row["group"] for row in rows} == {*compare.GROUPS} - {"models"}
+    assert {row["group"] for row in rows} == {*compare.GROUPS} - {"models", "gradients"}
     runs = {group: {x["run"] for x in rows if x["group"] == group} for group in compare.GROUPS}
     assert runs["steps"] >= METHODS | {"plain loop", "MuJoCo RK4", "MuJoCo implicitfast"}
     assert runs["life"] == runs["plant"] == METHODS
@@ -133,3 +134,11 @@ def test_models_in_equations_do_the_same_as_their_peers(solvers: Solvers) -> Non
     rows = json.loads(json.dumps(compare.judge([stars, chain])))  # as the report has them
     table = compare.summary({"rows": rows})
     assert f"| {stars['run']} |  |  |  |  |  | {compare.number(stars['ratio'])} |" in table
+
+
+def test_gradients_are_measured_for_all_methods() -> None:
+    found = compare.judge(by_gradients.rows(1))
+    wanted = {(method, f"gradients by {n}") for method in METHODS for n in (1, 5, 20)}
+    assert {(row["run"], row["work"]) for row in found} == wanted
+    assert all(0.0 < row["ratio"] < 42.0 for row in found if row["run"] == "cvode_bdf")
+    assert "gradients by 20: taylor" in "\n".join(compare.of_group(found, "gradients"))

@@ -197,8 +197,10 @@ static enum status decay(double t, const double x[], double dx[], void *count) {
     return STATUS_OK;
 }
 
+static size_t gradients; // copies among the states
+
 static enum status decay_jacobian(double t, const double x[], double J[], void *count) {
-    const size_t n = *(const size_t *)count;
+    const size_t n = *(const size_t *)count / (1 + gradients);
     memset(J, 0, n * n * sizeof(double));
     for (size_t i = 0; i < n; i++) {
         J[i * n + i] = -1.0;
@@ -218,6 +220,7 @@ static enum status decay_series(double t, double time_scale, int first, int last
 
 static struct ode decay_of(size_t *count) {
     return (struct ode){.state_count = *count,
+                        .gradient_count = gradients,
                         .rhs = decay,
                         .jacobian = decay_jacobian,
                         .series = decay_series,
@@ -280,17 +283,36 @@ static size_t bytes_taken(const struct method *method, const struct ode *ode) {
     return used;
 }
 
+/* Returns the largest number of bytes that a method takes; *size: the number that it wants. */
+static size_t most_bytes_taken(const struct ode *ode, size_t *size) {
+    size_t most = 0;
+    *size = 0;
+    for (size_t i = 0; i < COUNT(all_methods); i++) {
+        const size_t taken = bytes_taken(all_methods[i], ode);
+        const size_t wanted = all_methods[i]->memory_size(ode);
+        most = taken > most ? taken : most;
+        *size = wanted > *size ? wanted : *size;
+    }
+    return most;
+}
+
+static void test_the_workspace_of_gradients_is_enough(void) {
+    for (size_t n = 1; n <= 20; n++) {
+        for (gradients = 1; gradients <= 20; gradients++) {
+            size_t count = n * (1 + gradients);
+            const struct ode ode = decay_of(&count);
+            size_t size = 0;
+            TEST_ASSERT_TRUE(most_bytes_taken(&ode, &size) <= size);
+        }
+    }
+    gradients = 0;
+}
+
 static void test_the_workspace_of_an_integrator_is_no_larger_than_needed(void) {
     for (size_t n = 1; n <= 100; n++) {
         const struct ode ode = decay_of(&n);
         size_t size = 0;
-        size_t most = 0;
-        for (size_t i = 0; i < COUNT(all_methods); i++) {
-            const size_t taken = bytes_taken(all_methods[i], &ode);
-            const size_t wanted = all_methods[i]->memory_size(&ode);
-            most = taken > most ? taken : most;
-            size = wanted > size ? wanted : size;
-        }
+        const size_t most = most_bytes_taken(&ode, &size);
         TEST_ASSERT_TRUE(most <= size);
         TEST_ASSERT_TRUE(size <= most + 320);
     }
