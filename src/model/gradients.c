@@ -62,8 +62,8 @@ static void add_crossing(const struct call *call, const struct event *event, int
     struct departure *departure = call->room.gradients.departure;
     struct crossing found = crossing_of(call, relation);
     const bool is_flat = !(fabs(found.slope) > flat * found.size);
-    const bool turns = found.slope * found.curvature < 0.0;
-    const double depth = turns ? 0.5 * found.slope * found.slope / fabs(found.curvature) : INFINITY;
+    // how far from here the slope is 0, ahead or behind: a multiple root may be located beside it
+    const double depth = 0.5 * found.slope * found.slope / fabs(found.curvature);
     if (is_flat || is_within_reach(call, &found, depth)) {
         departure->doubtful = gradients->names[relation];
     }

@@ -15,6 +15,7 @@ from typing import Any
 from ..expressions.expression import RELATIONS, Node, in_order
 from ..expressions.hints import meant
 from ..expressions.kinds import CONDITION
+from ..graph.dominators import Slopes
 from ..graph.graph import Graph, Value
 from ..units import Exponents
 from . import keys
@@ -100,12 +101,14 @@ def read(file: ModelFile, given: dict[str, Any], by: list[str] | None) -> None:
                     raise ModelFileError("is there already")
                 found[of.name] = of
         of = entries.get("of")
-        for name in of or ():
+        for i, name in enumerate(of or ()):
             with placed("of", shown(name)):
                 _check_of(file, name)
+                if name in of[:i]:
+                    raise ModelFileError("is there already")
         if not found or of == []:
             raise ModelFileError(f"{'of' if found else 'by'}: expected names, got an empty list")
-    file.gradients = Gradients([*found.values()], of and [*dict.fromkeys(of)])
+    file.gradients = Gradients([*found.values()], of)
 
 
 def _by(file: ModelFile, text: str) -> By:
@@ -163,9 +166,10 @@ def add(file: ModelFile) -> None:
             places[variable.leaf].append(made.leaf)
     outputs = [v for v in file.of(*CALCULATED) if v.is_real and _is_wanted(gradients, v)]
     inputs = [u.leaf for u in file.of("inputs")]
+    slopes = Slopes(graph)
     for i, by in enumerate(gradients.by):
         seeds = gradients.seeds(graph, i)
-        rates = graph.derivatives([x.value for x in file.of("states") if x in moved], seeds)
+        rates = slopes.along([x.value for x in file.of("states") if x in moved], seeds)
         for x, rate in zip([v for v in moved if v.section == "states"], rates, strict=True):
             made = file.variables[_name(x, by)]
             made.expression = _expression(made, rate, f"derivative of d{x.name}/dt by {by.shown}")
