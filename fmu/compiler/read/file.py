@@ -16,7 +16,7 @@ from ..expressions.expression import ExpressionError, Node, in_order, with_names
 from ..expressions.kinds import CONDITION, NUMBER, WHOLE
 from ..expressions.parser import table_unit
 from ..units import ANGLE, BASE, Unit
-from . import contacts, functions, header, keys, terminals
+from . import contacts, functions, gradients, header, keys, terminals
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
 from .components import Components, check_loop, of_loop
@@ -524,6 +524,8 @@ def read(path: Path, above: tuple[Path, ...] = ()) -> ModelFile:
         for part in file.parts.values():
             file.sources += [path for path in part.sources if path not in file.sources]
         check(file)
+        if "gradients" in source.tables:
+            gradients.read(file, source.tables["gradients"])
     return file
 
 
