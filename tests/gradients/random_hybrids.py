@@ -55,14 +55,14 @@ class Hybrid:
         self.indicators: list[str] = []
         self.events: list[Event] = []
         self.table = ""
+        self.is_sampled = self.chance.random() < 0.4
         rows = [self.smooth(i) for i in range(n)]
-        kinks = [self.of_abs, self.of_max, self.of_min, self.of_time, self.of_table]
+        kinks = [self.of_abs, self.of_max, self.of_min, self.of_time, self.of_mod, self.of_table]
         for kink in self.chance.sample(kinks, self.chance.choice((0, 1, 1, 2))):
             self.add(rows, *kink(self.any_state()))
-        kinds = [self.fires, self.switches, self.meets]
+        kinds = [self.fires, self.switches, self.meets, self.happens_once]
         for kind in self.chance.sample(kinds, self.chance.choice((1, 1, 2))):
             kind(rows)
-        self.is_sampled = self.chance.random() < 0.4
         if self.is_sampled:
             self.p("Ts", 0.13, 0.4), self.p("gain", 0.5, 2)
             self.offset = self.chance.choice(("0", f"{self.p('late', 0.1, 0.9)} * Ts"))
@@ -126,6 +126,11 @@ class Hybrid:
         a, t = self.p("push", -2, 2), self.p("until", 0.3, 1.5)
         return f"({a} if time < {t} else 0)", f"(0 if {self.flag(f'time - {t}')} else {a})"
 
+    def of_mod(self, _: str) -> tuple[str, str]:
+        a, period = self.p("rises", -2, 2), self.p("period", 0.55, 0.9)
+        passed = " + ".join(self.flag(f"time - {k} * {period}") for k in (1, 2, 3))
+        return f"{a} * mod(time, {period})", f"{a} * (time - ({passed}) * {period})"
+
     def of_table(self, x: str) -> tuple[str, str]:
         at = [-0.9137, -0.2113, 0.4371, 1.1219]
         y = [self.number(-1, 1) for _ in at]
@@ -185,6 +190,15 @@ class Hybrid:
             lines += [f'offset = "{self.offset}"', f'set = {{ u = "{self.law}" }}']
         lines += [event.text(f"e{k}") for k, event in enumerate(self.events)]
         return "\n".join([*lines, "[gradients]", f"by = {self.by}".replace("'", '"'), ""])
+
+    def happens_once(self, _: list) -> None:
+        """At a time, or where a state passes what a sampler left."""
+        x = self.any_state()
+        reset = {x: f"{x} - {self.p('drop', 0.8, 1.6)}"} | self.jump(x)
+        if self.is_sampled:
+            self.event(x, f"{self.p('over', 0.2, 1)} + 0.5 * u", reset=reset)
+        else:
+            self.event("time", f"2 * {self.p('half', 0.1, 0.8)}", reset=reset)
 
 
 @dataclass
@@ -349,8 +363,7 @@ class Loop:
                 self.names["u"] = self.of(law, self.t, self.x)[0]
                 self.ticks += 1
                 self.change("tick")
-                if self.t == 0:
-                    self.settle()
+                self.settle()
             self.advance(end)
             if point == 0:
                 self.settle()
