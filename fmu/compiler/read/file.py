@@ -512,8 +512,11 @@ def _hint(variable: Variable | None, is_mode: bool) -> str:
     return f", of {variable.place}: what keeps its value until an event is one of [discrete]"
 
 
-def read(path: Path, above: tuple[Path, ...] = ()) -> ModelFile:
-    """Read and check a file; ModelFileError. above: files that have it as a component."""
+def read(path: Path, above: tuple[Path, ...] = (), by: list[str] | None = None) -> ModelFile:
+    """Read and check a file; ModelFileError.
+
+    above: files that have it as a component. by: as of model_file.read.
+    """
     with placed(path):
         source = source_of(path)
     with located(path, source.text):
@@ -524,8 +527,8 @@ def read(path: Path, above: tuple[Path, ...] = ()) -> ModelFile:
         for part in file.parts.values():
             file.sources += [path for path in part.sources if path not in file.sources]
         check(file)
-        if "gradients" in source.tables:
-            gradients.read(file, source.tables["gradients"])
+        if (by or "gradients" in source.tables) and not above:
+            gradients.read(file, source.tables.get("gradients", {}), by)
     return file
 
 

@@ -8,11 +8,11 @@ the leaves `shift` are the derivatives of that time, which src/model/gradients.h
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..expressions.expression import RELATIONS, Node
+from ..expressions.expression import RELATIONS, Node, in_order
 from ..expressions.hints import meant
 from ..expressions.kinds import CONDITION
 from ..graph.graph import Graph, Value
@@ -32,6 +32,8 @@ from .content import (
 
 ARE_EXACT = "gradients_are_exact"
 START = re.compile(r"start\(\s*(.+?)\s*\)")
+OF_IMPACTS = ("impulse", "impulses", "loss")  # of stops
+STEPS = {"floor", "ceil", "round", "sign"}
 SHIFT = "shift"  # leaf: derivative of the time of an event
 
 
@@ -84,14 +86,12 @@ class Gradients:
         }
 
 
-def read(file: ModelFile, given: dict[str, Any]) -> None:
-    """Read [gradients], which the command may have given, too."""
+def read(file: ModelFile, given: dict[str, Any], by: list[str] | None) -> None:
+    """Read [gradients]; by: in place of what the file says."""
     with placed("[gradients]"):
-        entries = keys.entries(given, keys.GRADIENTS, "by")
+        entries = keys.entries(given | ({"by": by} if by else {}), keys.GRADIENTS, "by")
         if file.hook or file.is_by_hand:
             raise ModelFileError("expected a model whose events are no C by hand")
-        if any(not contact.is_friction for contact in file.contacts):
-            raise ModelFileError("gradients through [stops] are not known")
         found: dict[str, By] = {}
         for text in entries["by"]:
             with placed("by", shown(text)):
@@ -135,10 +135,22 @@ def _check_of(file: ModelFile, name: str) -> None:
         raise ModelFileError("expected a real state, discrete variable or entry that follows")
 
 
+def warnings(file: ModelFile) -> Iterator[str]:
+    """Yield what has a gradient of 0 between its steps."""
+    for variable in file.calculated_reals:
+        functions = {node.function for node in in_order([variable.expression.tree])} & STEPS
+        if functions and f"{variable.name}_by_{file.gradients.by[0].name}" in file.variables:
+            yield (
+                f"[gradients]: {variable.name}: {min(functions)} rests between its steps, and so "
+                "its gradients miss how it changes with what they are by"
+            )
+
+
 def add(file: ModelFile) -> None:
     """Add the variables to a file whose expressions have their values."""
     gradients, graph = file.gradients, file.graph
-    moved = [v for v in file.of("states", "discrete") if v.is_real]
+    of_stops = {c.variable(key) for c in file.contacts for key in OF_IMPACTS}
+    moved = [v for v in file.of("states", "discrete") if v.name not in of_stops]
     for variable in moved:
         places = gradients.states if variable.section == "states" else gradients.discrete
         places[variable.leaf] = []

@@ -51,9 +51,12 @@ LEAVES = {
 }
 
 
-def read(path: Path) -> ModelFile:
-    """Read and check a file for values of its expressions; ModelFileError if something is wrong."""
-    file = file_reader.read(path)
+def read(path: Path, by: list[str] | None = None) -> ModelFile:
+    """Read and check a file for values of its expressions; ModelFileError if something is wrong.
+
+    by: what there are gradients by, in place of what the file says.
+    """
+    file = file_reader.read(path, by=by)
     # without states nothing is integrated: outputs follow at once
     has_switches = file.hook is None and bool(file.of("states") or file.events)
     is_exact = file.hook is None  # C by hand keeps its models where they have values
