@@ -11,6 +11,7 @@ import random
 import sys
 from dataclasses import dataclass, field
 from types import CodeType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,22 +26,13 @@ MOST_STEPS = 1000
 NAMES = {name: getattr(np, name) for name in ("sin", "exp", "tanh", "sqrt")}
 
 
-@dataclass
-class Event:
+class Event(NamedTuple):
     """Happens when an indicator gets above 0, in its mode; `to` is the mode after it."""
 
-    when: str
     indicator: int
-    reset: dict[str, str] = field(default_factory=dict)
-    mode: bool | None = None
-    to: bool | None = None
-
-    def text(self, name: str) -> str:
-        lines = [f"[events.{name}]", f'when = "{self.when}"']
-        lines += [] if self.mode is None else [f'while = "{"m" if self.mode else "not m"}"']
-        lines += [] if self.to is None else [f'set = {{ m = "{str(self.to).lower()}" }}']
-        resets = ", ".join(f'{x} = "{value}"' for x, value in self.reset.items())
-        return "\n".join([*lines, *([f"reinit = {{ {resets} }}"] if resets else [])])
+    reset: dict[str, str]
+    mode: bool | None
+    to: bool | None
 
 
 class Hybrid:
@@ -54,6 +46,7 @@ class Hybrid:
         self.parameters: dict[str, float] = {}
         self.indicators: list[str] = []
         self.events: list[Event] = []
+        self.lines: list[str] = []  # of them in the file
         self.table = ""
         self.is_sampled = self.chance.random() < 0.4
         rows = [self.smooth(i) for i in range(n)]
@@ -143,11 +136,23 @@ class Hybrid:
             )
         return f"T({x})", f"({text})"
 
-    def event(self, left: str, right: str, sign: int = 1, **options: object) -> None:
-        when = f"{left} {'<>'[sign > 0]} {right}"
-        difference = f"{left} - ({right})" if sign > 0 else f"{right} - ({left})"
-        self.flag(difference)
-        self.events.append(Event(when, len(self.indicators) - 1, **options))
+    def event(
+        self, left: str, right: str, reset: dict[str, str], sign: int = 1,
+        mode: bool | None = None,
+    ) -> None:  # fmt: skip
+        """Add an event: left passes right, upwards or downwards; one in a mode leaves it."""
+        self.flag(f"{left} - ({right})" if sign > 0 else f"{right} - ({left})")
+        name, to = f"[events.e{len(self.events)}]", None if mode is None else not mode
+        self.events.append(Event(len(self.indicators) - 1, reset, mode, to))
+        self.lines += [name, f'when = "{left} {"<>"[sign > 0]} {right}"']
+        if mode is not None:
+            self.lines += [
+                f'while = "{"m" if mode else "not m"}"',
+                f'set = {{ m = "{str(not mode).lower()}" }}',
+            ]
+        if reset:
+            pairs = ", ".join(f'{x} = "{value}"' for x, value in reset.items())
+            self.lines += [f"reinit = {{ {pairs} }}"]
 
     def jump(self, x: str) -> dict[str, str]:
         """A reset of another state than x, if there is one and chance wants it."""
@@ -167,8 +172,8 @@ class Hybrid:
     def switches(self, rows: list) -> None:
         x, i = self.any_state(), self.chance.randrange(len(rows))
         high, low = self.p("high", 0.3, 1.2), self.p("down", -0.8, 0.1)
-        self.event(x, high, mode=False, to=True, reset=self.jump(x))
-        self.event(x, low, -1, mode=True, to=False, reset=self.jump(x))
+        self.event(x, high, self.jump(x), mode=False)
+        self.event(x, low, self.jump(x), -1, mode=True)
         term = f"(-{self.p('pull', 2, 5)} if m else 0.5)"
         rows[i] = (f"{rows[i][0]} + {term}", f"{rows[i][1]} + {term}")
 
@@ -188,8 +193,9 @@ class Hybrid:
         if self.is_sampled:
             lines += ["[discrete]", "u = {}", "[sampled.law]", 'every = "Ts"']
             lines += [f'offset = "{self.offset}"', f'set = {{ u = "{self.law}" }}']
-        lines += [event.text(f"e{k}") for k, event in enumerate(self.events)]
-        return "\n".join([*lines, "[gradients]", f"by = {self.by}".replace("'", '"'), ""])
+        return "\n".join(
+            [*lines, *self.lines, "[gradients]", f"by = {self.by}".replace("'", '"'), ""]
+        )
 
     def happens_once(self, _: list) -> None:
         """At a time, or where a state passes what a sampler left."""

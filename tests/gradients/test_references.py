@@ -87,25 +87,6 @@ def test_gradients_are_those_of_the_run(case: Case, method: str, version: str) -
     assert found[EXACT].all()
 
 
-@pytest.mark.parametrize("case", CASES[:-1], ids=[case.model for case in CASES[:-1]])
-def test_the_references_are_smooth(case: Case) -> None:
-    """Also by differences of another size: no event is passed between the two runs."""
-    _, gradients = reference(case.model)
-    for name, column in zip(FIXED.get(case.model, case.start), gradients, strict=True):
-        step = mpf(10) ** -9
-        rows = [
-            np.array(
-                case.run(
-                    case.times,
-                    *(mpf(x) + sign * step * (name == other) for other, x in case.start.items()),
-                )
-            )
-            for sign in (1, -1)
-        ]
-        quotient = np.array((rows[0] - rows[1]) / (2 * step), float)
-        assert quotient == pytest.approx(column, abs=1e-4 * np.abs(column).max())
-
-
 @pytest.mark.parametrize(("method", "version"), [*product(["cvode_bdf", "taylor"], ["2.0", "3.0"])])
 @pytest.mark.parametrize("model", ["VanDerPol", "Twice"])
 def test_gradients_of_sensitivities_by_hand_are_second_derivatives(
