@@ -54,7 +54,8 @@ struct departure {
     bool jumps;           /* true if the event has assigned something */
     const char *cause;    /* the first one; NULL: none yet */
     const char *other;    /* one at the same instant whose time changes in another way */
-    const char *doubtful; /* one that another parameter would let vanish or appear */
+    const char *doubtful; /* one that another parameter would let vanish */
+    const char *missed;   /* one that another parameter would let happen */
 };
 
 /* Memory for one call. */
