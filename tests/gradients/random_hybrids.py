@@ -252,24 +252,25 @@ class Loop:
             table = row
         return table[-1]
 
+    def holding(self, keep: int) -> list[bool]:
+        """Which conditions hold; an indicator at its root, `keep`, is past it."""
+        for k, sign in enumerate(self.of(self.signs, self.t, self.x)):
+            if k != keep or abs(sign) > 1e-12:
+                self.K[k] = bool(sign > 0)
+        m = self.names["m"]
+        return [self.K[event.indicator] and event.mode in (None, m) for event in self.model.events]
+
     def settle(self, keep: int = -1) -> None:
-        """Look at all conditions until no event happens; an indicator at its root is past it."""
+        """Look at all conditions until no event happens; one may end that of the next."""
         for _ in range(20):
-            signs = self.of(self.signs, self.t, self.x)
-            for k, sign in enumerate(signs):
-                if k != keep or abs(sign) > 1e-12:
-                    self.K[k] = bool(sign > 0)
-            holds = [
-                self.K[e.indicator] and e.mode in (None, self.names["m"]) for e in self.model.events
-            ]
-            new = [now and not before for now, before in zip(holds, self.held, strict=True)]
-            self.held = holds
-            if not any(new):
+            before, self.held = self.held, self.holding(keep)
+            new = [k for k, holds in enumerate(self.held) if holds and not before[k]]
+            if not new:
                 return
-            for k, event in enumerate(self.model.events):
-                if new[k]:
-                    self.happen(event)
-        self.motion.doubt = self.motion.doubt or "events without end"
+            for k in new:
+                if self.holding(keep)[k]:
+                    self.happen(self.model.events[k])
+        self.doubt("events without end")
 
     def happen(self, event: Event) -> None:
         values = {x: self.of(code, self.t, self.x) for x, code in self.resets[id(event)].items()}
