@@ -39,12 +39,13 @@ MAY_INCLUDE = {
     r"fmu/fmi": ("src/instance", "src/model"),
     r"fmu/fmi\d": ("fmu/fmi", "src/instance", "src/model"),
     r"models": ("src/model",),
-    r"models/\w+": ("models", "src/model"),
+    r"models/\w+(/with_elements)?": ("models", "src/model"),
 }  # fmt: skip
 # the equations of another model
 MAY_INCLUDE_MODEL = {
     "models/rp_controller": "models/rp_manipulator",
     "models/rp_plant": "models/rp_manipulator",
+    "models/rp_plant/with_elements": "models/rp_manipulator",
 }
 
 # folders that hide headers; those of others are all public

@@ -8,6 +8,7 @@ from ..expressions.kinds import CONDITION
 from ..graph.band import band
 from ..graph.curve import Curve
 from ..graph.graph import FALLIBLE, Value, is_number
+from ..graph.plain import plain
 from ..graph.stribeck import REACHED
 from ..names import Field
 from ..read.content import CALCULATED, OPTIONS, ModelFile
@@ -220,7 +221,8 @@ def _followed(file: ModelFile, events: Events) -> tuple[dict[Value, Value], list
     rates = {state.leaf: state.value for state in file.of("states")}
     if file.hook:
         return rates, [file.variables[name].value for name in file.hook.series]
-    return rates, [*c_indicators.in_series(events)]
+    values = plain(file.graph, [*rates.values(), *c_indicators.in_series(events)])
+    return dict(zip(rates, values, strict=False)), values[len(rates) :]
 
 
 def _has_kinks(followed: tuple[dict[Value, Value], list[Value]]) -> bool:

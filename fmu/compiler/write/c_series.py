@@ -24,7 +24,6 @@ from ..graph.graph import (
     Value,
     unsigned,
 )
-from ..graph.plain import plain
 from ..graph.stribeck import REACHED
 from ..plain_c.values import Conditions
 from .blocks import Blocks
@@ -62,7 +61,7 @@ class Series:
     ) -> None:
         self.graph, self.leaves = graph, leaves
         self.is_limited = is_limited  # elsewhere, to how far it holds
-        roots = plain(graph, [*rates.values(), *followed])
+        roots = [*rates.values(), *followed]
         self.is_wide = is_wide(roots, leaves.conditions)
         roots = scaled(graph, roots, self.is_wide)
         roots, plan, used = self._in_branches(roots)
