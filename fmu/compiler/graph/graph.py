@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
-from ..expressions.expression import RANDOM, RELATIONS, Node, in_order
+from ..expressions.expression import PARTIAL, RANDOM, RELATIONS, ExpressionError, Node, in_order
 from ..expressions.parser import parse
 from . import algebraic, undefined
 from .algebraic import GIVEN, UNKNOWN, Linear, System
@@ -233,11 +233,26 @@ class Graph:
                     value = self.functions[node.name](given, is_instant)
                 case "unit":
                     value = given[0]
+                case op if op == PARTIAL:
+                    value = self._partial(node, *given)
                 case op:
                     value = (relate if op in RELATIONS else self.value)(op, *given)
             found[node] = value
             self.nodes += [node] * (len(self.relations) - len(self.nodes))
         return found[root]
+
+    def _partial(self, node: Node, y: Value, x: Value) -> Value:
+        """The derivative that an expression asks for."""
+        if x.op not in ("parameter", "input", "state", "discrete"):
+            wanted = "expected a state, an input, a parameter or a discrete variable to derive by"
+            raise ExpressionError(node.arguments[1].column, f"{wanted}, got {x.name or x.op}")
+        if unknown := sorted(name for op, name in y.leaves if op == UNKNOWN):
+            text = f"cannot derive what is solved together with {unknown[0]}"
+            raise ExpressionError(node.column, f"{PARTIAL}: {text}")
+        guarded, self.is_guarded = self.is_guarded, False  # it has derivatives itself
+        found = self.derivative(y, x)
+        self.is_guarded = guarded
+        return found
 
     def _element(self, node: Node, given: list[Value]) -> Value:
         """The element at indexes that follow from variables; not a number where there is none."""
