@@ -19,6 +19,7 @@ from typing import Any
 
 from rparm.errors import UserError
 from rparm.estimator import toml
+from rparm.estimator.observability import unobservable
 from rparm.estimator.request import PLANT, Request, load
 from rparm.files import write_text
 from rparm.fmu_tools.compiler.expressions.expression import RELATIONS, Node, in_order, names, written
@@ -98,6 +99,12 @@ class Equations:
                 value = variable.value if state != name or variable.leaf is None else variable.leaf
                 found.update(self._slopes(value, self.by_leaf))
         return [name for name in self.estimated if name in found]
+
+    def _by_time(self, text: str, given: Iterable[str]) -> str:
+        """Return the derivative of a text by the time, if one of its names follows from it."""
+        found = [v for v in map(self.plant.variables.get, given) if v and v.leaf is None]
+        follows = "time" in given or any(("time", "") in v.value.leaves for v in found)
+        return f"partial({text}, time)" if follows else ""
 
     def _closure(self) -> set[tuple[str, str]]:
         """Return the elements of P that are not always 0, above and on the diagonal."""
@@ -317,7 +324,7 @@ class Equations:
         local[name("innovation")] = f"{self.own('{}_measured', y)} - {y}"
         reinit = {}
         for x, text in covariance.items():
-            local[name("gain", x)] = f"{text} / {name('sum')}"
+            local[name("gain", x)] = f"{text} / {name('innovation_variance')}"
             local[name("left", x)] = f"{text} - {name('gain', x)} * {name('expected')}"
             reinit[x] = f"{x} + {name('gain', x)} * {name('innovation')}"
         for i, j in self.elements():
@@ -333,7 +340,7 @@ class Equations:
             "every": PERIOD,
             "where": local,
             "reinit": reinit,
-            "set": {nis: f"{name('innovation')}**2 / {name('sum')}"},
+            "set": {nis: f"{name('innovation')}**2 / {name('innovation_variance')}"},
         }
 
     def _zero_variance(self, y: str) -> str:
@@ -421,7 +428,7 @@ class Equations:
         distance = f"({written(sides[0])}) - ({written(sides[1])})"
         turn = {k: self.name("turn", k) for k in moving}
         local |= {self.name("slope", k): f"partial({distance}, {k})" for k in moving}
-        of_time = f"partial({distance}, time)"
+        of_time = self._by_time(distance, frozenset().union(*map(names, sides)))
         speed = self.name("speed")
         terms = [product(self.name("slope", k), self.rate(k)) for k in moving]
         local[speed] = total([*terms, of_time])
@@ -443,7 +450,8 @@ class Equations:
             if x in self.states:
                 text = total(product(s, self.rate(k)) for k, s in rows[x].items())
                 if x in event.reinit:
-                    text = total([text, f"partial({_text(event, event.reinit[x])}, time)"])
+                    new = event.reinit[x]
+                    text = total([text, self._by_time(_text(event, new), names(new.tree))]) or "0"
                 hidden = self.name("rate", event.name, x)
                 shifts[x] = hold(hidden, text, self.unit(x, seconds=-1))
         square = total(product(turn[i], self.p(i, j), turn[j]) for i in moving for j in moving)
@@ -480,6 +488,14 @@ class Equations:
         for name in request.measure:
             if not self.h[name]:
                 raise UserError(f"{request.path}: measure: {name}: no state of the plant moves it")
+        unseen = unobservable(request)
+        measured, unknown = ", ".join(request.measure), [x for x in unseen if x in request.unknown]
+        if unknown:
+            what = f"{', '.join(unknown)} cannot be told from {measured}: other values fit as well"
+            raise UserError(f"{request.path}: unknown: {what}")
+        if unseen:
+            what = f"{measured} does not show {', '.join(unseen)}: the deviation may grow"
+            self.warnings.append(f"measure: {what}")
         if plant.modes:
             what = "is not measured: it follows the estimate"
             self.warnings.append(f"{plant.path.name}: mode {', '.join(plant.modes)} {what}")

@@ -243,8 +243,8 @@ class Graph:
 
     def _partial(self, node: Node, y: Value, x: Value) -> Value:
         """The derivative that an expression asks for."""
-        if x.op not in ("parameter", "input", "state", "discrete"):
-            wanted = "expected a state, an input, a parameter or a discrete variable to derive by"
+        if x.op not in ("parameter", "input", "state", "discrete", "time"):
+            wanted = "expected a state, an input, a parameter, a discrete variable or time"
             raise ExpressionError(node.arguments[1].column, f"{wanted}, got {x.name or x.op}")
         if unknown := sorted(name for op, name in y.leaves if op == UNKNOWN):
             text = f"cannot derive what is solved together with {unknown[0]}"
