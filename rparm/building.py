@@ -62,7 +62,7 @@ def build(
         project.refuse_other(file, tables, "build")
     runtimes = project.runtimes(platforms, web)
     with temporary_folder() as work, _equations(file, tables) as equations:
-        kept, *fmus = _kept(equations, runtimes, not (platforms or web), work, notes=lock)
+        kept, *fmus = _kept(equations, file, runtimes, not (platforms or web), work, notes=lock)
         paths = Path(output) / fmus[0], Path(output) / fmus[1]
         # the cache may have it from a file of another name
         made = {_lock(file): work / kept} if lock else {}
@@ -112,11 +112,11 @@ def _lock(file: Path) -> Path:
 
 
 def _kept(
-    file: Path, runtimes: list[Path], of_this_machine: bool, work: Path, notes: bool
+    file: Path, shown: Path, runtimes: list[Path], of_this_machine: bool, work: Path, notes: bool
 ) -> list[str]:
     """Make the lock file and the FMUs in the folder `work`, or take them from the cache.
 
-    notes: whether those are printed, not only warnings.
+    shown: the file of the user. notes: whether those are printed, not only warnings.
     """
     cache = build_cache.of_user()
 
@@ -139,7 +139,7 @@ def _kept(
     for line in warnings.splitlines():
         kind = NOTE if line.startswith(NOTE) else WARNING
         if notes or kind == WARNING:
-            print(line.replace(kind, f"{kind}{file}: ", 1), file=sys.stderr)
+            print(line.replace(kind, f"{kind}{shown}: ", 1), file=sys.stderr)
     for name, content in found.items():
         (work / name).parent.mkdir(exist_ok=True)
         (work / name).write_bytes(content)

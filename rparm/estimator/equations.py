@@ -113,7 +113,7 @@ class Equations:
         linked = {(x, x) for x in spreads}
         if self.jumps:
             linked |= {(x, y) for x in self.estimated for y in self.estimated}
-        before = 0
+        before = -1
         while before < len(linked):
             before = len(linked)
             for x, y in pairs(self.states, 2):

@@ -98,6 +98,8 @@ def _plant(path: Path, given: object) -> tuple[ModelFile, dict[str, Any]]:
     if not isinstance(given, str) or not given.lower().endswith(".toml"):
         raise UserError(f"{path}: {PLANT}: expected a plant such as plant.toml, got {show(given)}")
     file = path.parent / given
+    if not file.is_file():
+        raise UserError(f"{path}: {PLANT}: {file}: no such file")
     content = read_toml(file)
     if is_estimator(content):
         raise UserError(f"{path}: {PLANT}: {file} is an estimator itself, expected its plant")

@@ -249,10 +249,26 @@ class Graph:
         if unknown := sorted(name for op, name in y.leaves if op == UNKNOWN):
             text = f"cannot derive what is solved together with {unknown[0]}"
             raise ExpressionError(node.column, f"{PARTIAL}: {text}")
-        guarded, self.is_guarded = self.is_guarded, False  # it has derivatives itself
-        found = self.derivative(y, x)
-        self.is_guarded = guarded
-        return found
+        return self._plain(self.derivative(y, x))
+
+    def _plain(self, root: Value) -> Value:
+        """The derivative without guards, so that it has derivatives itself."""
+        found: dict[Value, Value] = {}
+        for v in in_order([root]):
+            given = [found[argument] for argument in v.arguments]
+            match v.op:
+                case "slopes_scaled" | "slopes_product" | "slopes_both":
+                    found[v] = self.simple("*", *given[:2])
+                case "slopes_over" | "slopes_reduced":
+                    found[v] = self.simple("/", *given[:2])
+                case "slopes_bounded":
+                    found[v] = given[0]
+                case "slopes_logged":
+                    found[v] = self.simple("*", given[0], self.value("log", given[1]))
+                case _:
+                    is_same = all(a is b for a, b in zip(given, v.arguments, strict=True))
+                    found[v] = v if is_same else self._with(v, found)
+        return found[root]
 
     def _element(self, node: Node, given: list[Value]) -> Value:
         """The element at indexes that follow from variables; not a number where there is none."""
