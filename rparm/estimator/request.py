@@ -15,7 +15,7 @@ from rparm.units import SECONDS, quantity, units_of
 
 PLANT = "estimator"  # the key that makes a file one of an estimator
 DEVIATIONS = ("measure", "noise", "start", "unknown")
-KEYS = ("name", "description", PLANT, "every", *DEVIATIONS, "sigma")
+KEYS = ("name", "description", PLANT, "every", "offset", *DEVIATIONS, "sigma")
 NEEDED = ("name", PLANT, "every", "measure")
 SHORTEST = 1e-9  # s, of periods
 REFUSED = {  # sections of plants
@@ -35,6 +35,7 @@ class Request:
     name: str
     description: str
     every: float  # s
+    offset: float  # s, of the first measurement from the start
     plant: ModelFile
     tables: dict[str, Any]  # of the plant, with what it includes
     measure: dict[str, float] = field(default_factory=dict)  # in the order of the updates
@@ -70,10 +71,11 @@ def load(path: Path) -> Request:
     if not isinstance(given.get("description", ""), str):
         refuse(f"description: expected a text, got {show(given['description'])}")
     every = _positive(path, "every", given["every"], None)
+    offset = _positive(path, "offset", given["offset"], None) if given.get("offset") else 0.0
     if every < SHORTEST:
         refuse(f"every: expected {SHORTEST:g} s or more, got {show(given['every'])}")
     plant, tables = _plant(path, given[PLANT])
-    found = Request(path, given["name"], given.get("description", ""), every, plant, tables)
+    found = Request(path, given["name"], given.get("description", ""), every, offset, plant, tables)
     for key, what in (
         ("measure", "an output"), ("noise", "an input"), ("start", "a state"),
         ("unknown", "a parameter"),
@@ -139,7 +141,9 @@ def _variable(
         where = f"of {other.place}" if where == "one" else where
         raise UserError(f"{path}: {key}: {name} is {where}, expected {what} of {plant.path.name}")
     guess = did_you_mean(name, known)
-    raise UserError(f"{path}: {key}: {plant.path.name} has no such {what.split()[1]}: {name}{guess}")
+    raise UserError(
+        f"{path}: {key}: {plant.path.name} has no such {what.split()[1]}: {name}{guess}"
+    )
 
 
 def _positive(path: Path, place: str, given: object, variable: Variable | None) -> float:

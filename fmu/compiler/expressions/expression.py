@@ -82,8 +82,8 @@ class Node:
     (then `name`), "text" (`name`, an item of an enumeration), "table" (a look-up in the table
     `name`), "call" (of the function `name`), "unit" (its first argument, in the unit `name`), an
     operator of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not", "if"
-    (arguments: condition, value if true, otherwise), "floor", "hypot", `PARTIAL` (arguments: what is
-    derived, by which name), or a name of `FUNCTIONS`. min and max have two arguments here.
+    (arguments: condition, value if true, otherwise), "floor", "hypot", `PARTIAL` (arguments: what
+    is derived, by which name), or a name of `FUNCTIONS`. min and max have two arguments here.
     "element" of an array by indexes that follow from variables (arguments: the indexes; `name` has
     {} where they come; behind them, once `with_elements` has added them, the elements in `of`).
     Until `at_indexes` has replaced them: other elements, and `OVER_RANGES` of the `body` over the
