@@ -53,7 +53,7 @@ def check(terms: Terms) -> list[str]:
 
 
 def _of_changes(terms: Terms) -> Iterator[str]:
-    """Yield warnings of events that may happen again, and of held values that follow from states."""
+    """Yield warnings of events that may happen again, and of held values taken as exact."""
     file = terms.plant.path.name
     for event in terms.plant.events:
         nodes = in_order([e.tree for e in event.conditions])
