@@ -31,8 +31,8 @@ class Case:
 
 
 def pendulum(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-    phi, omega, l = x
-    return np.array([omega, (u[0] - 0.1 * omega - G * l * np.sin(phi)) / l**2, 0 * phi])
+    phi, omega, length = x
+    return np.array([omega, (u[0] - 0.1 * omega - G * length * np.sin(phi)) / length**2, 0 * phi])
 
 
 def cart(x: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -58,7 +58,10 @@ inertia = { value = "m * l**2", unit = "kg.m2" }
 torque = { unit = "N.m" }
 [states]
 phi = { start = 1.0, unit = "rad", derivative = "omega" }
-omega = { unit = "rad/s", derivative = "(torque - 0.1[N.m.s] * omega - m * 9.81[m/s2] * l * sin(phi)) / inertia" }
+omega = { unit = "rad/s", derivative = "(torque - drag - weight * sin(phi)) / inertia" }
+[where]
+drag = "0.1[N.m.s] * omega"
+weight = "m * 9.81[m/s2] * l"
 [check]
 "the length must be above 0" = "inertia > 0"
 """
@@ -104,14 +107,16 @@ def test_errors_are_as_large_as_it_says(case: Case, tmp_path: Path) -> None:
     true, y = [x.T], []
     for k in range(steps + 1):
         u = [of(k * case.period) + s * random.normal(size=RUNS) for of, s in case.inputs.values()]
-        y.append({f"{name}_measured": true[-1][case.states.index(name)] + s * random.normal(size=RUNS)
-                  for name, s in case.measured.items()})  # fmt: skip
+        now = dict(zip(case.states, true[-1], strict=True))
+        noisy = {x: now[x] + s * random.normal(size=RUNS) for x, s in case.measured.items()}
+        y.append({f"{x}_measured": values for x, values in noisy.items()})
         true.append(ahead(case.rates, true[-1], np.array(u), case.period, case.substeps))
     errors, squares = np.zeros((RUNS, len(looked_at))), []
     with filter_of(case.plant, case.request, tmp_path) as slave:
         for run in range(RUNS):
             for k in range(steps + 1):
-                given = {name: of(max(k - 1, 0) * case.period) for name, (of, _) in case.inputs.items()}
+                before = max(k - 1, 0) * case.period
+                given = {name: of(before) for name, (of, _) in case.inputs.items()}
                 given |= {name: values[run] for name, values in y[k].items()}
                 slave.step(case.period, given) if k else slave.start(given)
                 squares.append(slave.get(*(f"nis_{name}" for name in case.measured)))
