@@ -77,7 +77,7 @@ def test_a_linear_plant_has_the_matrices_of_kalman(offset: float, tmp_path: Path
                 assert slave.get("sigma_a")[0] == pytest.approx(np.sqrt(p[0, 0]), rel=1e-9)
 
 
-# limits move, new values follow from states and time, a mode changes rates, a sampler resets a state
+# limits move, new values follow from states and time, a mode changes rates, a sampler resets T
 JUMPS = """
 name = "Jumps"
 modes = ["slow"]
