@@ -17,11 +17,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
-from ..expressions.expression import PARTIAL, RANDOM, RELATIONS, ExpressionError, Node, in_order
+from ..expressions.expression import PARTIAL, RANDOM, RELATIONS, Node, in_order
 from ..expressions.parser import parse
 from . import algebraic, undefined
 from .algebraic import GIVEN, UNKNOWN, Linear, System
 from .contacts import Contacts
+from .derived import derived
 from .tables import FAR, LookupTable
 
 ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
@@ -234,40 +235,11 @@ class Graph:
                 case "unit":
                     value = given[0]
                 case op if op == PARTIAL:
-                    value = self._partial(node, *given)
+                    value = derived(self, node, *given)
                 case op:
                     value = (relate if op in RELATIONS else self.value)(op, *given)
             found[node] = value
             self.nodes += [node] * (len(self.relations) - len(self.nodes))
-        return found[root]
-
-    def _partial(self, node: Node, y: Value, x: Value) -> Value:
-        """The derivative that an expression asks for."""
-        if x.op not in ("parameter", "input", "state", "discrete", "time"):
-            wanted = "expected a state, an input, a parameter, a discrete variable or time"
-            raise ExpressionError(node.arguments[1].column, f"{wanted}, got {x.name or x.op}")
-        if unknown := sorted(name for op, name in y.leaves if op == UNKNOWN):
-            text = f"cannot derive what is solved together with {unknown[0]}"
-            raise ExpressionError(node.column, f"{PARTIAL}: {text}")
-        return self._plain(self.derivative(y, x))
-
-    def _plain(self, root: Value) -> Value:
-        """The derivative without guards, so that it has derivatives itself."""
-        found: dict[Value, Value] = {}
-        for v in in_order([root]):
-            given = [found[argument] for argument in v.arguments]
-            match v.op:
-                case "slopes_scaled" | "slopes_product" | "slopes_both":
-                    found[v] = self.simple("*", *given[:2])
-                case "slopes_over" | "slopes_reduced":
-                    found[v] = self.simple("/", *given[:2])
-                case "slopes_bounded":
-                    found[v] = given[0]
-                case "slopes_logged":
-                    found[v] = self.simple("*", given[0], self.value("log", given[1]))
-                case _:
-                    is_same = all(a is b for a, b in zip(given, v.arguments, strict=True))
-                    found[v] = v if is_same else self._with(v, found)
         return found[root]
 
     def _element(self, node: Node, given: list[Value]) -> Value:
