@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from building import PLACES, Runtime, build
+from compiler.read import gradients
 from compiler.read.model_file import ModelFile, ModelFileError, read
 from compiler.write import declaration, lock
 from package import pack
@@ -31,9 +32,11 @@ def main() -> int:
     parser.add_argument("--runtime", type=Path, nargs="+", required=True, help=text)
     text = "that is the platform: any compiler will do"
     parser.add_argument("--of-this-machine", action="store_true", help=text)
+    text = "by which there are gradients, in place of those in the file"
+    parser.add_argument("--gradients", nargs="+", metavar="NAME", help=text)
     arguments = parser.parse_args()
     try:
-        file = read(arguments.file)
+        file = read(arguments.file, arguments.gradients)
         lock_file = lock.path_of(arguments.file)
         references = lock.references(lock_file, declaration.keys(file))
         runtimes = [Runtime.load(path, arguments.of_this_machine) for path in arguments.runtime]
@@ -59,6 +62,8 @@ def main() -> int:
 def _warnings(file: ModelFile) -> Iterator[str]:
     """Yield warnings: allowed, but hardly meant."""
     yield from file.code.warnings if file.code else ()
+    if file.gradients:
+        yield from gradients.warnings(file)
     for state in file.of("states"):
         start, nominal = abs(state.start or 0.0), state.nominal or 1.0
         if 0.0 < start < TOLERANCE * nominal:

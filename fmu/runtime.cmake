@@ -7,7 +7,7 @@ foreach(version IN LISTS FMI_VERSIONS)
   add_library(${target} OBJECT ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
   target_include_directories(${target} PRIVATE ${FMU_SOURCE_DIR}/fmi)
   target_include_directories(${target} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
-  target_link_libraries(${target} PRIVATE instance contacts relations)
+  target_link_libraries(${target} PRIVATE instance contacts gradients relations)
   folder_in_fmu(${version} ${PLATFORM} folder)
   manifest_entry(${target} entry)
   list(APPEND runtime_versions "\"${version}\": {\"folder\": \"binaries/${folder}\", \"sources\": ${entry},

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ def build(
     platforms: bool = False,
     web: bool = False,
     lock: bool = True,
+    gradients: Sequence[str] = (),
 ) -> tuple[Path, Path]:
     """Make FMUs of the equations in a file; examples/models/README.md explains it.
 
@@ -49,6 +50,9 @@ def build(
         As WebAssembly, by zig, for the playground.
     lock : bool
         Whether the lock file is written.
+    gradients : sequence of str
+        Parameters, and starts of states as start(NAME), by which there are gradients; they replace
+        those in the file.
 
     Returns
     -------
@@ -62,10 +66,12 @@ def build(
         project.refuse_other(file, tables, "build")
     runtimes = project.runtimes(platforms, web)
     with temporary_folder() as work, _equations(file, tables) as equations:
-        kept, *fmus = _kept(equations, file, runtimes, not (platforms or web), work, notes=lock)
+        options = not (platforms or web), gradients, work
+        kept, *fmus = _kept(equations, file, runtimes, *options, notes=lock)
         paths = Path(output) / fmus[0], Path(output) / fmus[1]
         # the cache may have it from a file of another name
-        made = {_lock(file): work / kept} if lock else {}
+        keeps = lock and not gradients  # which are not of the file
+        made = {_lock(file): work / kept} if keeps else {}
         _put(made | dict(zip(paths, (work / name for name in fmus), strict=True)))
     return paths
 
@@ -112,7 +118,13 @@ def _lock(file: Path) -> Path:
 
 
 def _kept(
-    file: Path, shown: Path, runtimes: list[Path], of_this_machine: bool, work: Path, notes: bool
+    file: Path,
+    shown: Path,
+    runtimes: list[Path],
+    of_this_machine: bool,
+    gradients: Sequence[str],
+    work: Path,
+    notes: bool,
 ) -> list[str]:
     """Make the lock file and the FMUs in the folder `work`, or take them from the cache.
 
@@ -121,14 +133,17 @@ def _kept(
     cache = build_cache.of_user()
 
     def parts() -> list[object]:
-        return build_cache.parts_of(file, runtimes, of_this_machine, NEEDED) if cache.folder else []
+        if not cache.folder:
+            return []
+        found = build_cache.parts_of(file, runtimes, of_this_machine, NEEDED)
+        return found and [*found, *gradients]
 
     lock = _lock(file)
     origin = parts()
     key = build_cache.key(origin, lock)
     found = cache.get(key) if origin else None
     if found is None:
-        names, warnings = _made(file, runtimes, of_this_machine, work)
+        names, warnings = _made(file, runtimes, of_this_machine, gradients, work)
         found = {WARNINGS: warnings.encode("utf-8", "surrogateescape")}
         found |= {name: (work / name).read_bytes() for name in names}
         # a file may have changed in between
@@ -147,12 +162,13 @@ def _kept(
 
 
 def _made(
-    file: Path, runtimes: list[Path], of_this_machine: bool, work: Path
+    file: Path, runtimes: list[Path], of_this_machine: bool, gradients: Sequence[str], work: Path
 ) -> tuple[list[str], str]:
     """Make the lock file and the FMUs in the folder `work`; their names, and warnings."""
     tool = project.model_builder()
     command = [sys.executable, tool, "--output", work, "--runtime", *runtimes]
     command += ["--of-this-machine"] if of_this_machine else []
+    command += ["--gradients", *gradients] if gradients else []
     # zig keeps its C library in a cache; temporary files go to `work`, also of a killed program
     kept = os.environ.get("ZIG_GLOBAL_CACHE_DIR") or str(project.cache_folder("zig"))
     environment = {"ZIG_GLOBAL_CACHE_DIR": kept}

@@ -1,6 +1,7 @@
 """`build`, `estimator` and `new-model`: files with equations, and those from which they follow."""
 
 import argparse
+import re
 import shlex
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +13,7 @@ from rparm.errors import UserError
 from rparm.files import NAME, check_for_windows, create, read_toml, written
 
 SUFFIX = ".toml"
+COMMA = re.compile(r",(?![^[(]*[])])")  # none within brackets
 
 
 def own_file(options: argparse.Namespace, kind: str) -> Path:
@@ -63,7 +65,8 @@ def do_estimator(options: argparse.Namespace) -> Ended:
 
 def do_build(options: argparse.Namespace) -> Ended:
     to, where = options.output or Path(), {"platforms": options.platforms, "web": options.web}
-    paths = build(options.file, output=to, **where)
+    gradients = COMMA.split(options.gradients) if options.gradients else ()
+    paths = build(options.file, output=to, gradients=[*map(str.strip, gradients)], **where)
     then = f"a scenario of it: {project.PROGRAM} new my_run --model {shlex.quote(str(paths[0]))}"
     then = f"drop one on the page: {project.PROGRAM} playground --open" if options.web else then
     verdict = f"{' and '.join(map(str, paths))}: built; {then}"

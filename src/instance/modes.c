@@ -84,8 +84,9 @@ static enum status update(struct instance *instance, const bool *triggered, doub
         instance->du[i] = inputs[i].d[1];
     }
     char reason[300];
+    char note[300];
     const char *text = NULL;
-    reason[0] = '\0';
+    reason[0] = note[0] = '\0';
     const struct event event = {
         .t = instance->state.time.s,
         .triggered = triggered,
@@ -102,10 +103,16 @@ static enum status update(struct instance *instance, const bool *triggered, doub
         .text = &text,
         .reason = reason,
         .reason_size = sizeof reason,
+        .note = note,
+        .note_size = sizeof note,
     };
     const double passed = event.is_timed ? instance_next_time(instance) : -INFINITY;
     const bool had_ended = instance_explain_end(instance, NULL, 0);
     const enum status status = events->update(instance->memory.values, &event);
+    if (note[0] != '\0') {
+        message_write(&instance->sink, STATUS_INEXACT_GRADIENTS,
+                      "from t = %.17g on gradients are not exact: %s", event.t, note);
+    }
     char end[1024];
     if (status == STATUS_OK && !had_ended && instance_explain_end(instance, end, sizeof end)) {
         message_write(&instance->sink, STATUS_ENDED, "the simulation ends at t = %.17g: %s",

@@ -57,6 +57,8 @@ struct event {
     char *reason; /* room for one line of reason_size bytes: update writes why it fails. NULL if the
                      caller does not read it */
     size_t reason_size;
+    char *note; /* likewise, empty: update writes what the user should know about gradients */
+    size_t note_size;
 };
 
 /* Returns the shortest period (s) of time events about the time t (s). With fewer than 4096 doubles
@@ -245,6 +247,11 @@ struct model {
     enum status (*jacobian)(const void *values, double t, const double x[], const double u[],
                             double J[]);
     const struct band *band; /* NULL: of the full Jacobian */
+
+    /* Number of parameters by which the gradients of the states are states, too: behind the states
+     * follows a copy of them for each. All copies have the Jacobian of the states, which is all
+     * that jacobian writes; their derivatives by the states may be anything. */
+    size_t gradient_count;
 
     /* Taylor series of the states. NULL if the model offers none: only a model whose right-hand
      * side has all derivatives everywhere may offer one. */

@@ -103,7 +103,7 @@ static enum status assign(const struct call *call, int number, const struct even
     memcpy(call->room.counted, counts, counts_size);
     if (number >= 0) {
         model->change(call->values, call->t, relations_later(call->t, call->error), number,
-                      call->room.tolerance);
+                      call->du, call->room.gradients.shift, call->room.tolerance);
     } else if (model->start != NULL) {
         model->start(call->values);
     }
@@ -160,12 +160,13 @@ static enum status perform(const struct call *call, int number, const struct eve
         return status;
     }
     (void)follow_change(call);
+    if (call->model->gradients != NULL) {
+        call->room.gradients.departure->jumps = true;
+    }
     return STATUS_OK;
 }
 
-/* True if the next tick of a sampler, at the time *tick, is at the time t (s) or before. Times that
- * differ only by rounding, such as 3 0.1 and 1 0.3, are one instant. */
-static bool is_due(const struct call *call, int sampler, double t, double *tick) {
+bool relations_is_due(const struct call *call, int sampler, double t, double *tick) {
     const double *discrete = discrete_of(call);
     /* of the sum that is the time of the tick: its parts may cancel */
     const double size = fabs(discrete[0]) + fabs(call->room.offset[sampler]) +
@@ -187,7 +188,7 @@ static void set_time(struct call *call, const struct event *event) {
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
         double tick;
-        if (is_due(call, i, now, &tick)) {
+        if (relations_is_due(call, i, now, &tick)) {
             call->t = fmax(call->t, tick);
             period = call->room.every[i];
         }
@@ -207,7 +208,7 @@ static enum status run_samplers(const struct call *call, const struct event *eve
     model->write_periods(call->values, call->room.every, call->room.offset);
     for (int i = 0; i < model->sampler_count; i++) {
         double tick;
-        if (is_due(call, i, call->t, &tick)) {
+        if (relations_is_due(call, i, call->t, &tick)) {
             const enum status status = perform(call, model->event_count + i, event);
             if (status != STATUS_OK) {
                 return status;
@@ -295,7 +296,6 @@ static void pass(const struct call *call, const struct event *event) {
     const struct relations *model = call->model;
     const struct relations_room room = call->room;
     modes_compare(call, room.tolerance, room.compared);
-    update_timed_modes(call);
     for (int k = 0; k < call->relation_count; k++) {
         const struct relation *relation = &model->relation[k];
         if (!relation->is_timed && event->triggered != NULL) {
@@ -304,9 +304,15 @@ static void pass(const struct call *call, const struct event *event) {
             const bool falls =
                 event->triggered[relation->indicator] && !(event->du_is_known && slope > 0.0);
             const bool passes = falls || joins(&room.compared[k], call->holds[k]);
-            call->holds[k] ^= passes;
-            room.turned[k] |= !passes ? 0 : call->holds[k] ? RISEN : FALLEN;
+            room.turned[k] |= !passes ? 0 : call->holds[k] ? FALLEN : RISEN;
         }
+    }
+    if (model->gradients != NULL) {
+        model->gradients->depart(call, event);
+    }
+    update_timed_modes(call);
+    for (int k = 0; k < call->relation_count; k++) {
+        call->holds[k] ^= (room.turned[k] & (RISEN | FALLEN)) != 0;
     }
     if (event->triggered != NULL) {
         (void)modes_settle(call);
@@ -442,6 +448,9 @@ enum status relations_update(const struct relations *model, struct relations_roo
             status = follow_contacts(&call, event, was_begun && count == 0, false, &changes);
             fires |= changes && model->event_count > 0;
         }
+    }
+    if (status == STATUS_OK && model->gradients != NULL) {
+        model->gradients->arrive(&call, event);
     }
     const int wrong = status == STATUS_OK && !fires ? modes_contradiction(&call) : -1;
     if (wrong >= 0) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "contacts.h"
+#include "gradients.h"
 #include "model.h"
 
 #include <float.h>
@@ -89,7 +90,8 @@ struct relations {
     const char *const *every_names;  /* of the period of each sampler */
     const struct assignment *assignment;
     int assignment_count;
-    const struct contacts *contacts; /* NULL: none */
+    const struct contacts *contacts;   /* NULL: none */
+    const struct gradients *gradients; /* NULL: none */
 
     /* False if parameters switch off all that reads relations. NULL if they cannot. */
     bool (*are_read)(const void *values);
@@ -108,8 +110,10 @@ struct relations {
     void (*find_due)(const void *values, double t, int due[]);
     /* Performs an event or, with event_count added to its number, a sampler: right sides use the
      * values before it; a state that jumps gets the tolerance of its right side. later: time at
-     * which right sides see what switches by the time, s. */
-    void (*change)(void *values, double t, double later, int event, double tolerance[]);
+     * which right sides see what switches by the time, s. du: derivative of each input by the time;
+     * shift: of the time of the event by each parameter of gradients. */
+    void (*change)(void *values, double t, double later, int event, const double du[],
+                   const double shift[], double tolerance[]);
     /* Returns "NAME = expression" of a condition or whole number that has no value: of what
      * `change` would assign, or of RELATIONS_START, RELATIONS_CONDITIONS; NULL if all have one.
      * NULL if none can miss it. */
@@ -130,6 +134,7 @@ struct relations_room {
     int *counted;              /* one per count */
     const double *zeros;       /* one per state and input */
     struct contacts_room contacts;
+    struct gradients_room gradients;
 };
 
 static inline const int *relations_modes(const struct relations *model, const void *values) {

@@ -85,6 +85,10 @@ void modes_begin(const struct call *call);
  * call->room.before: the relations before the change. */
 void modes_switch_fallen(const struct call *call);
 
+/* True if the next tick of a sampler, at the time *tick, is at the time t (s) or before. Times that
+ * differ only by rounding, such as 3 0.1 and 1 0.3, are one instant. */
+bool relations_is_due(const struct call *call, int sampler, double t, double *tick);
+
 /* Clears room.turned. */
 void modes_clear_turned(const struct call *call);
 

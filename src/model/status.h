@@ -19,6 +19,7 @@ enum severity {
 #define STATUS_LIST(X)                                                                             \
     X(STATUS_OK, SEVERITY_NONE, "ok")                                                              \
     X(STATUS_COARSE_TOLERANCE, SEVERITY_NOTICE, "a tolerance is too coarse")                       \
+    X(STATUS_INEXACT_GRADIENTS, SEVERITY_NOTICE, "gradients are not exact")                        \
     X(STATUS_NOT_FINITE, SEVERITY_DISCARD, "a value is not finite")                                \
     X(STATUS_OUT_OF_RANGE, SEVERITY_DISCARD, "a value is out of its range")                        \
     X(STATUS_TOO_MANY_STEPS, SEVERITY_DISCARD,                                                     \

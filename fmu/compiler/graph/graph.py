@@ -32,6 +32,7 @@ LEAVES = (
     *("parameter", "input", "state", "discrete", "time", "mode", "integer"),
     "later",  # time, of what has switched by the time at an instant
     *("first", "second"),
+    "shift",  # derivative of the time of an event by a parameter
     "anchor",  # where a solution is searched
     *(UNKNOWN, GIVEN),
 )

@@ -160,6 +160,12 @@ class Change:
     reinit: dict[str, Expression]  # by state
     set: dict[str, Expression]  # by mode or discrete variable
     where: list[Expression]  # which the others name
+    gradients: dict[str, Expression] = field(default_factory=dict, kw_only=True)  # by their names
+
+    @property
+    def assigned(self) -> dict[str, Expression]:
+        """New values by variable or mode, with those of gradients."""
+        return self.given | self.gradients
 
     @property
     def given(self) -> dict[str, Expression]:
@@ -278,6 +284,7 @@ class ModelFile:
     contacts: list[Contact] = field(default_factory=list)
     checks: list[tuple[str, Expression]] = field(default_factory=list)  # messages and conditions
     terminals: dict[str, Terminal] = field(default_factory=dict)
+    gradients: Any = None  # read/gradients.py
     blocks: dict[Expression, Block] = field(default_factory=dict)  # by each of their expressions
     anchors: dict[str, Variable] = field(default_factory=dict)  # unknowns without a start
     is_by_hand: bool = False  # it has no equations: by_hand.py

@@ -16,7 +16,7 @@ from ..expressions.expression import ExpressionError, Node, in_order, with_names
 from ..expressions.kinds import CONDITION, NUMBER, WHOLE
 from ..expressions.parser import table_unit
 from ..units import ANGLE, BASE, Unit
-from . import contacts, functions, header, keys, terminals
+from . import contacts, functions, gradients, header, keys, terminals
 from .arrays import FOR, elements, every, target
 from .code import read as read_code
 from .components import Components, check_loop, of_loop
@@ -512,8 +512,11 @@ def _hint(variable: Variable | None, is_mode: bool) -> str:
     return f", of {variable.place}: what keeps its value until an event is one of [discrete]"
 
 
-def read(path: Path, above: tuple[Path, ...] = ()) -> ModelFile:
-    """Read and check a file; ModelFileError. above: files that have it as a component."""
+def read(path: Path, above: tuple[Path, ...] = (), by: list[str] | None = None) -> ModelFile:
+    """Read and check a file; ModelFileError.
+
+    above: files that have it as a component. by: as of model_file.read.
+    """
     with placed(path):
         source = source_of(path)
     with located(path, source.text):
@@ -524,6 +527,8 @@ def read(path: Path, above: tuple[Path, ...] = ()) -> ModelFile:
         for part in file.parts.values():
             file.sources += [path for path in part.sources if path not in file.sources]
         check(file)
+        if (by or "gradients" in source.tables) and not above:
+            gradients.read(file, source.tables.get("gradients", {}), by)
     return file
 
 

@@ -66,7 +66,7 @@ NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
     *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
     *("functions", "sampled", "events", "friction", "stops", "check", "terminals", "hook"),
-    *("components", "connections", "calculate"),
+    *("components", "connections", "calculate", "gradients"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
@@ -77,6 +77,7 @@ EVENT = ("when", "while", "where", "reinit", "set", "terminate")
 EFFECTS = ("set", "reinit", "terminate")
 FRICTION = ("force", "velocity", "coulomb", "breakaway", "stribeck", "while")
 STOPS = ("force", "position", "velocity", "lower", "upper", "restitution", "while")
+GRADIENTS = ("by", "of")
 HOOK = ("sources", "indicators", "series", "reads", "reach")
 SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
@@ -231,7 +232,7 @@ READ = {
     "arguments": _arguments,
     "code": _code,
     "field": _expect("a field of C such as damping[0]", str, FIELD.fullmatch),
-    **dict.fromkeys(("sources", "indicators", "series"), LIST),
+    **dict.fromkeys(("sources", "indicators", "series", "by", "of"), LIST),
     "reads": _expect("a table", dict, lambda _: True),
     "reach": _expect("true or false", bool, lambda _: True),
     **dict.fromkeys(("file", "derivative_of", "calculate"), TEXT),

@@ -18,6 +18,7 @@ from ..names import Fields, StructFields
 from ..plain_c.memory import is_real
 from ..plain_c.text import CTextError
 from . import file as file_reader
+from . import gradients
 from .code import Calls
 from .components import all_parts
 from .content import (
@@ -50,23 +51,18 @@ LEAVES = {
 }
 
 
-def read(path: Path) -> ModelFile:
-    """Read and check a file for values of its expressions; ModelFileError if something is wrong."""
-    file = file_reader.read(path)
+def read(path: Path, by: list[str] | None = None) -> ModelFile:
+    """Read and check a file for values of its expressions; ModelFileError if something is wrong.
+
+    by: what there are gradients by, in place of what the file says.
+    """
+    file = file_reader.read(path, by=by)
     # without states nothing is integrated: outputs follow at once
     has_switches = file.hook is None and bool(file.of("states") or file.events)
     is_exact = file.hook is None  # C by hand keeps its models where they have values
     graph = Graph(tables=file.tables, has_switches=has_switches, is_guarded=is_exact)
     file.graph, calls = graph, Calls(file.code.program, graph, is_exact) if file.code else None
     known = leaves(file, graph)
-    counts = [v.name for v in file.of(COUNTS)]
-    calculated = [v.name for v in file.calculated]
-    sections = ("parameters", "inputs", "states", "discrete", OPTIONS, SWITCHES)
-    names = [[v.name for v in file.of(section)] for section in sections]
-    file.fields = Fields([*names, calculated, [*file.modes, *counts]])
-    if file.hook:
-        states = [v.name for v in file.of("states")]
-        file.fields = StructFields(file.header.places, RATES, states)
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known["pi"] = graph.number(math.pi)
     if calls:
@@ -125,9 +121,6 @@ def read(path: Path) -> ModelFile:
                 if name not in file.variables:
                     way_out = meant(name, file.variables)
                     raise ModelFileError(f"terminate: {{{name}}}: no such variable{way_out}")
-    own = {state.value: f"der_{state.name}" for state in reversed(file.of("states"))}
-    own |= {variable.value: variable.name for variable in reversed(file.calculated)}
-    graph.names |= {value: name for value, name in own.items() if value.arguments}
     places = [source.place for source in sources]
     file.relation_texts = [
         in_c[name]
@@ -137,7 +130,25 @@ def read(path: Path) -> ModelFile:
         else f"{_shown(node)} of {' '.join(place[:2])}"
         for name, node, place in zip(graph.relations, graph.nodes, places, strict=True)
     ]
+    if file.gradients:
+        with file_reader.located(path, file.text):
+            gradients.add(file)
+    file.fields = _fields(file)
+    own = {state.value: f"der_{state.name}" for state in reversed(file.of("states"))}
+    own |= {variable.value: variable.name for variable in reversed(file.calculated)}
+    graph.names |= {value: name for value, name in own.items() if value.arguments}
     return file
+
+
+def _fields(file: ModelFile) -> Fields | StructFields:
+    """Return where the struct of values has the variables."""
+    if file.hook:
+        states = [v.name for v in file.of("states")]
+        return StructFields(file.header.places, RATES, states)
+    sections = ("parameters", "inputs", "states", "discrete", OPTIONS, SWITCHES)
+    names = [[v.name for v in file.of(section)] for section in sections]
+    calculated = [v.name for v in file.calculated]
+    return Fields([*names, calculated, [*file.modes, *(v.name for v in file.of(COUNTS))]])
 
 
 class Blocks:

@@ -17,7 +17,7 @@ from ..names import Field, c_name
 from ..plain_c.values import Conditions
 from ..read.content import CALCULATED, COUNTS, OPTIONS, SWITCHES, Change, ModelFile, Sampler
 from ..units import Exponents
-from . import c_contacts, c_indicators, c_possible, c_undefined
+from . import c_contacts, c_gradients, c_indicators, c_possible, c_undefined
 from .c_code import Code, Leaves, located, told
 from .c_text import declared, filled, indented, shortened, text
 from .errors import NONE, Errors
@@ -176,6 +176,9 @@ class Events:
         for segment in graph.segments.values():
             readers |= {segment.low.name: segment.leaf, segment.high.name: segment.leaf}
         self.used = {name: used.get(reader, graph.number(0.0)) for name, reader in readers.items()}
+        if file.gradients:  # slopes matter where their relations do
+            own = [*self.used][file.gradients.relations :]
+            self.used |= {slope: self.used[file.gradients.watched[slope]] for slope in own}
         self.located = graph.located
 
     def __bool__(self) -> bool:
@@ -292,11 +295,18 @@ class Events:
             switches=self._switches(),
             starts_follow=[".starts_follow = true,"] if file.started else [],
             located=len(self.located) + len(self.limits),
-            **c_contacts.parts(file, self.leaves, [*counted(file)], self._compare_limits()),
+            **c_contacts.parts(
+                file,
+                self.leaves,
+                [*counted(file)],
+                self._compare_limits(),
+                c_gradients.along(file, self.leaves),
+            ),
             next_time=NEXT_TIME if timed or file.sampled else [],
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
+            **c_gradients.parts(self),
             **c_possible.parts(self),
             indicators=searched.assign(indicators).lines(),
             **self._is_known(),
@@ -469,7 +479,7 @@ class Events:
         counts = counted(self.file)
         found = [(-1, v.name, v.initial) for v in self.file.started if v.is_real]
         for i, change in enumerate([*self.file.events, *self.file.sampled]):
-            found += [(i, n, e) for n, e in change.given.items() if n not in counts]
+            found += [(i, n, e) for n, e in change.assigned.items() if n not in counts]
         return [
             f"{{{i}, offsetof(struct equations_values, {self.file.fields.value(name)}), "
             f"{shortened(f'{name} = ', expression, self.file.tables)}}},"
@@ -507,9 +517,10 @@ class Events:
 
     def _change(self, index: int, change: Change) -> list[str]:
         """What an event or a sampler of the file does."""
-        code = Code(self.leaves.but({("later", ""): "later"}))
-        is_single = len(change.given) + len(change.reinit) == 1
-        new = {name: e.value for name, e in change.given.items()}
+        moving = c_gradients.shifts(self.file)
+        code = Code(self.leaves.but({("later", ""): "later", **moving}))
+        is_single = len(change.assigned) + len(change.reinit) == 1
+        new = {name: e.value for name, e in change.assigned.items()}
         stores = self._assigned(code, new, is_single)
         errors = Errors(self.graph, code, self.tolerances)
         jumped = {name: errors.of(e.value) for name, e in change.reinit.items()}

@@ -88,6 +88,7 @@ def source(file: ModelFile) -> str:
             *(c_hook.parameters(file) if file.hook else _parameter_lines(file)),
             *_range_lines(file, {k: v for k, v in _ranges(file).items() if k != "parameters"}),
         ],
+        gradient_count=[f".gradient_count = {len(file.gradients.by)},"] if file.gradients else [],
         model_events=[f".events = &{c_hook.events(file)},"] if events else [],
     )
 
@@ -164,6 +165,8 @@ def _range_lines(file: ModelFile, ranges: Mapping[str, list[Field]]) -> list[str
 def _smooth(file: ModelFile) -> dict[str, Any]:
     """What the methods of integration evaluate, a smooth function between events."""
     states = file.of("states")
+    motion = {Place("rate[", i, "]"): state.value for i, state in enumerate(states)}
+    states = states[: len(file.gradients.states)] if file.gradients else states
     rates, count = [state.value for state in states], len(states)
     found: dict[Value, dict[Value, Value]] = {}
     rows = file.graph.gradients(rates, [state.leaf for state in states], found)
@@ -185,7 +188,6 @@ def _smooth(file: ModelFile) -> dict[str, Any]:
         for k, ((i, j), slope) in enumerate(slopes.items())
     }
     clear = [f"for (size_t i = 0; i < {size}; i++) {{", "    slope[i] = 0.0;", "}"]
-    motion = {Place("rate[", i, "]"): rate for i, rate in enumerate(rates)}
     jacobian = Code(arrays(file), names=names).assign(entries).lines()
     return {
         "right_hand_side": Code(arrays(file)).assign(motion).lines(),

@@ -307,6 +307,8 @@ def _entries_of(
         by_events = any(variable.name in change.reinit for change in file.changes)
         in_c = file.hook is not None or bool(file.indicators) or file.time_events
         entries["reinit"] = by_events or in_c or variable.leaf in _moved(file)
+        if file.gradients and variable.leaf not in file.gradients.states:
+            entries["reinit"] = bool(file.graph.relations or file.changes)
     if variable.section == "discrete":
         entries |= {"variability": "discrete", "initial": "exact"}
         leaves = _reached({("discrete", variable.name)}, file, ["discrete"])
@@ -432,8 +434,8 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
             todo += initial.value.leaves if initial is not None else ()
         is_changed = op in changed or _is_in(file, name, COUNTS)
         for change in file.changes if is_changed else ():
-            if name in change.given:
-                own = [*change.conditions, change.given[name]]
+            if name in change.assigned:
+                own = [*change.conditions, change.assigned[name]]
                 todo += [leaf for expression in own for leaf in expression.value.leaves]
     return found
 

@@ -1,0 +1,160 @@
+"""Gradients of a run in C (src/model/gradients.h): what an event's time follows from."""
+
+from __future__ import annotations
+
+from functools import reduce
+from typing import TYPE_CHECKING
+
+from ..graph.graph import Value
+from ..read.content import ModelFile
+from ..read.gradients import ARE_EXACT
+from . import c_contacts
+from .c_code import Code, Leaves
+from .c_text import filled, indented, text
+from .statements import Operand, Place, store
+
+if TYPE_CHECKING:
+    from .c_events import Events
+
+NONE = {"gradients": [], "of_gradients": [], "room_of_gradients": ", {0}"}
+
+
+def parts(events: Events) -> dict[str, object]:
+    """Return the functions, the member of struct relations and the initializer of the memory."""
+    file = events.file
+    if file.gradients is None:
+        return NONE
+    by, states = file.gradients.by, [*file.gradients.states]
+    names = [*file.graph.relations]
+    limits = [f"{limit.contact}.{limit.key}" for limit in events.limits]
+    distances = [relation.distance for relation in events.relations]
+    distances += [c_contacts.distance(file, limit) for limit in events.limits]
+    watched = [names.index(file.gradients.watched[r]) if r in file.gradients.watched else -1
+               for r in names]  # fmt: skip
+    found = filled(
+        "gradients.c.in",
+        size=", ".join(repr(given.size) for given in by),
+        names=", ".join(text(name[:100]) for name in [*file.relation_texts, *limits]) or "NULL",
+        relations=file.gradients.relations,
+        watched=", ".join(map(str, watched)) or "-1",
+        rates=_rates(events),
+        crossings=[line for i, distance in enumerate(distances)
+                   for line in _crossing(events, i, distance)],
+        ticks=_ticks(events),
+        count=len(by),
+        states=len(states),
+        are_exact=file.fields.count(ARE_EXACT),
+    )  # fmt: skip
+    contacts = file.graph.contacts
+    counts = (
+        [len(of) for of in (contacts.directions, contacts.contacts, contacts.moved)]
+        if contacts
+        else []
+    )
+    of_contacts = "0"
+    if contacts:
+        of_contacts = f"CONTACTS_MEASURED({', '.join(map(str, counts))}) + {2 * counts[0]}"
+    return {
+        "gradients": found.splitlines(),
+        "of_gradients": [".gradients = &gradients,"],
+        "room_of_gradients": f", GRADIENTS_ROOM({len(by)}, {len(states)}, {of_contacts})",
+    }
+
+
+def shifts(file: ModelFile) -> dict[tuple[str, str], Operand]:
+    """Return where an event finds how its time and the inputs move."""
+    moving: dict[tuple[str, str], Operand] = {
+        ("first", u.name): Place("du[", i, "]") for i, u in enumerate(file.of("inputs"))
+    }
+    by = file.gradients.by if file.gradients else ()
+    return moving | {("shift", given.name): Place("shift[", j, "]") for j, given in enumerate(by)}
+
+
+def along(file: ModelFile, leaves: Leaves) -> dict[str, list[str]]:
+    """Return how gradients see what is measured at an impact."""
+    found, gradients, graph = file.graph.contacts, file.gradients, file.graph
+    if gradients is None or found is None:
+        return {"measure_along": [], "of_gradients": []}
+    count = len(found.contacts)
+    values = {Place("to->velocity[", k, "]"): d.velocity for k, d in enumerate(found.directions)}
+    for key, rows in (("response", found.response), ("jump", found.moved.values())):
+        for i, row in enumerate(rows):
+            of = {Place(f"to->{key}[", i * count + e, "]"): v for e, v in enumerate(row)}
+            values |= of
+    for e, contact in enumerate(found.contacts):
+        own = c_contacts.of_contact(file, contact)
+        keys = [key for key in ("ratio", "restitution", "at_lower", "at_upper") if key in own]
+        values |= {Place(f"to->{key}[", e, "]"): own[key] for key in keys}
+    lines, inputs = [], [u.leaf for u in file.of("inputs")]
+    for j in range(len(gradients.by)):
+        slopes = graph.derivatives(values.values(), gradients.seeds(graph, j, inputs))
+        code = Code(leaves.but(shifts(file)))
+        code.assign(dict(zip(values, slopes, strict=True)))
+        lines += [f"if (parameter == {j}) {{", *indented(code.lines()), "}"]
+    head = [
+        "static void measure_along(const void *values_pointer, double time, const double du[],",
+        "                          const double shift[], int parameter,",
+        "                          const struct contacts_measured *to) {",
+        "    const struct equations_values *values = values_pointer;",
+        "    (void)values;",
+        "    (void)du;",
+        "    (void)shift;",
+    ]
+    members = [".measure_along = measure_along,"]
+    members += [f".{name}_gradients = contacts_{name}_gradients," for name in ("strike", "hold")]
+    return {"measure_along": [*head, *indented(lines), "}", ""], "of_gradients": members}
+
+
+def _rates(events: Events) -> list[str]:
+    code = Code(events.leaves)
+    states = events.file.of("states")[: len(events.file.gradients.states)]
+    return code.assign({Place("rate[", i, "]"): x.value for i, x in enumerate(states)}).lines()
+
+
+def _crossing(events: Events, index: int, distance: Value) -> list[str]:
+    """How a distance moves by the time and by each parameter."""
+    file, graph = events.file, events.graph
+    gradients, inputs = file.gradients, file.of("inputs")
+    code = Code(events.leaves.but(shifts(file)))
+    motion = {x.leaf: x.value for x in file.of("states") if x.leaf in gradients.states}
+    motion |= {graph.value("time"): graph.number(1.0)}
+    motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
+    parameters = {by.variable.leaf for by in gradients.by if not by.is_start}
+    (slopes,) = graph.gradients([distance], [*motion, *gradients.discrete, *parameters])
+    terms = [graph.simple("*", slope, motion[x]) for x, slope in slopes.items() if x in motion]
+    slope, size = _sums(events, code, terms)
+    (whole,) = graph.derivatives([distance], motion)
+    (curvature,) = graph.derivatives([whole], motion)
+    stores = [store("to->slope", slope), store("to->size", size)]
+    stores.append(store("to->curvature", code.of(curvature)))
+    for j in range(len(gradients.by)):
+        seeds = gradients.seeds(graph, j)
+        terms = [graph.simple("*", of, seeds[x]) for x, of in slopes.items() if x in seeds]
+        total, size = _sums(events, code, terms)
+        stores += [store(Place("to->by[", j, "]"), total)]
+        stores += [store(Place("to->sizes[", j, "]"), size)]
+    code.statements += stores
+    return [f"if (relation == {index}) {{", *indented(code.lines()), "}"]
+
+
+def _sums(events: Events, code: Code, terms: list[Value]) -> tuple[Operand, Operand]:
+    """Return the sum of terms, and of their magnitudes."""
+    given = [code.of(term) for term in terms] or [0.0]
+    sizes = [("fabs", code.constant(operand)) for operand in given] if terms else [0.0]
+    return (reduce(lambda a, b: ("+", a, b), of) for of in (given, sizes))
+
+
+def _ticks(events: Events) -> list[str]:
+    """Derivatives of the time of a tick, offset + count every, by each parameter."""
+    file, graph, lines = events.file, events.graph, []
+    for i, sampler in enumerate(file.sampled):
+        code, count = Code(events.leaves), f"values->{events.discrete[1 + i]}"
+        stores = []
+        for j, by in enumerate(file.gradients.by):
+            seeds = {} if by.is_start else {by.variable.leaf: graph.number(1.0)}
+            periods = [sampler.every.value, sampler.offset.value]
+            every, offset = map(code.of, graph.derivatives(periods, seeds))
+            stores.append(store(Place("shift[", j, "]"), ("+", offset, ("*", count, every))))
+        code.statements += stores
+        lines += [f"if (sampler == {i}) {{", *indented(code.lines()), "}"]
+    return lines

@@ -1,0 +1,85 @@
+/* Gradients of a run of a model that is made from its equations (fmu/compiler): how the states
+ * change with parameters, and with starts of states.
+ *
+ * Each parameter p has its own copy S of the states, S = dx/dp at a fixed time. Between events S' =
+ * J S + f_p. An event at the time T(p) needs the change along with T: S + f T_p, with the rates
+ * before it; the new values' derivatives follow from that, and S after it is theirs minus f T_p,
+ * with the rates after it. Hiskens and Pai, Trajectory Sensitivity Analysis of Hybrid Systems, IEEE
+ * Transactions on Circuits and Systems I 47 (2000), equations (29) to (38).
+ *
+ * T_p follows from what has caused the event: where a relation g comes to its limit, T_p = -(g_x S
+ * + g_p) / (g_x f + g_t + g_u u'); a tick's time is a function of parameters; what happens at the
+ * start, or since inputs have jumped, does so at a fixed time. All that follows at the same instant
+ * has the same T_p. */
+#pragma once
+
+#include "model.h"
+
+struct call;
+
+/* How the distance of a relation moves. */
+struct crossing {
+    double slope;     /* derivative by the time, 1/s */
+    double size;      /* sum of the magnitudes of its terms */
+    double curvature; /* second derivative by the time, 1/s2 */
+    double *by;       /* derivative by each parameter, at a fixed time */
+    double *sizes;    /* of each: sum of the magnitudes of its terms */
+};
+
+struct gradients {
+    int count;                /* of parameters */
+    int state_count;          /* of the model without gradients, which come first */
+    size_t are_exact;         /* offset of an int */
+    const double *size;       /* of a change of each parameter that is not small */
+    const char *const *names; /* of relations, then of the limits of contacts */
+    int relation_count;       /* those of the model; behind them slopes are compared with 0 */
+    const int *watched; /* of each relation: the one whose slope it compares with 0; -1: none */
+
+    /* Writes the rates of the states. */
+    void (*rates)(const void *values, double t, double rate[]);
+    /* Writes how the distance of a relation, or behind them of a limit of contacts, moves. */
+    void (*cross)(const void *values, double t, const double du[], int relation,
+                  struct crossing *to);
+    /* Writes derivatives of the time of a sampler's next tick by each parameter. */
+    void (*tick)(const void *values, int sampler, double shift[]);
+
+    /* The functions below. FMUs whose model does not name them are linked without them. */
+    void (*depart)(const struct call *call, const struct event *event);
+    void (*arrive)(const struct call *call, const struct event *event);
+};
+
+/* What is known about an event. */
+struct departure {
+    bool has_departed;
+    bool jumps;           /* true if the event has assigned something */
+    const char *cause;    /* the first one; NULL: none yet */
+    const char *other;    /* one at the same instant whose time changes in another way */
+    const char *doubtful; /* one that another parameter would let vanish */
+    const char *missed;   /* one that another parameter would let happen */
+};
+
+/* Memory for one call. */
+struct gradients_room {
+    double *shift;    /* T_p of each parameter, s by its unit */
+    double *noise;    /* of each shift */
+    double *rate;     /* two per state */
+    double *by;       /* two per parameter */
+    double *contacts; /* what is measured of them, and two per direction */
+    struct departure *departure;
+};
+
+#define GRADIENTS_ROOM(parameters, states, of_contacts)                                            \
+    (struct gradients_room) {                                                                      \
+        (double[parameters]){0}, (double[parameters]){0}, (double[2 * (states) + 1]){0},           \
+            (double[2 * (parameters)]){0}, (double[(of_contacts) + 1]){0}, &(struct departure) {   \
+            0                                                                                      \
+        }                                                                                          \
+    }
+
+/* Finds what causes the event, from relations in `turned` and time events, and lets the gradients
+ * move with its time. Modes and values are those before the event. */
+void gradients_depart(const struct call *call, const struct event *event);
+
+/* Returns the gradients to a fixed time, with the modes and values after the event. Writes why they
+ * are not exact. */
+void gradients_arrive(const struct call *call, const struct event *event);
