@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from rparm.errors import UserError, WrongValueError, did_you_mean
 from rparm.files import NAME, read_toml, show
@@ -17,6 +17,13 @@ PLANT = "estimator"  # the key that makes a file one of an estimator
 DEVIATIONS = ("measure", "noise", "start", "unknown")
 KEYS = ("name", "description", PLANT, "every", "offset", *DEVIATIONS, "sigma")
 NEEDED = ("name", PLANT, "every", "measure")
+NAMED = {  # sections whose real variables a key names
+    "measure": (("states", "outputs"), "an output"),
+    "sigma": (("states", "outputs"), "an output"),
+    "noise": (("inputs",), "an input"),
+    "start": (("states",), "a state"),
+    "unknown": (("parameters",), "a parameter"),
+}
 SHORTEST = 1e-9  # s, of periods
 REFUSED = {  # sections of plants
     "friction": "sticks in ways that no covariance describes",
@@ -53,46 +60,49 @@ def is_estimator(content: Iterable[str]) -> bool:
 def load(path: Path) -> Request:
     """Read and check the file of an estimator; UserError."""
     given = read_toml(path)
-
-    def refuse(text: str) -> NoReturn:
-        raise UserError(f"{path}: {text}")
-
-    for key in given:
-        if key not in KEYS:
-            refuse(f"unknown key {show(key)}{did_you_mean(key, KEYS) or f', expected {KEYS}'}")
-    for key in NEEDED:
-        if key not in given:
-            refuse(f"{key} is missing")
-    for key in DEVIATIONS:
-        if not isinstance(given.get(key, {}), dict):
-            refuse(f"{key}: expected a table such as {{ phi = 0.02 }}, got {show(given[key])}")
-    if not isinstance(given["name"], str) or not NAME.fullmatch(given["name"]):
-        refuse(f"name: expected a letter, then letters, digits, _, got {show(given['name'])}")
-    if not isinstance(given.get("description", ""), str):
-        refuse(f"description: expected a text, got {show(given['description'])}")
+    _check(path, given)
     every = _positive(path, "every", given["every"], None)
     offset = _positive(path, "offset", given["offset"], None) if given.get("offset") else 0.0
     if every < SHORTEST:
-        refuse(f"every: expected {SHORTEST:g} s or more, got {show(given['every'])}")
+        raise UserError(f"{path}: every: expected {SHORTEST:g} s or more, got {every:g} s")
     plant, tables = _plant(path, given[PLANT])
-    found = Request(path, given["name"], given.get("description", ""), every, offset, plant, tables)
-    for key, what in (
-        ("measure", "an output"), ("noise", "an input"), ("start", "a state"),
-        ("unknown", "a parameter"),
-    ):  # fmt: skip
-        known = _known(plant, key)
+    about = given.get("description", "")
+    found = Request(path, given["name"], about, every, offset, plant, tables)
+    for key in DEVIATIONS:
         for name, sigma in given.get(key, {}).items():
-            variable = _variable(path, key, name, known, what, plant)
+            variable = _variable(path, key, name, plant)
             getattr(found, key)[name] = _positive(path, f"{key}: {name}", sigma, variable)
     if not found.measure:
-        refuse("measure: expected outputs of the plant, each with its standard deviation")
-    further = given.get("sigma", [])
-    if not isinstance(further, list) or not all(isinstance(name, str) for name in further):
-        refuse(f"sigma: expected a list of outputs, got {show(further)}")
-    for name in further:
-        _variable(path, "sigma", name, _known(plant, "measure"), "an output", plant)
-    found.sigma = further
+        what = "expected outputs of the plant, each with its standard deviation"
+        raise UserError(f"{path}: measure: {what}")
+    found.sigma = given.get("sigma", [])
+    for name in found.sigma:
+        _variable(path, "sigma", name, plant)
     return found
+
+
+def _check(path: Path, given: Mapping[str, Any]) -> None:
+    """Check the keys, and the kinds of their values; UserError."""
+    wrong = ""
+    for key in given:
+        if key not in KEYS:
+            guess = did_you_mean(key, KEYS) or f", expected one of {', '.join(KEYS)}"
+            raise UserError(f"{path}: unknown key {show(key)}{guess}")
+    for key in NEEDED:
+        if key not in given:
+            raise UserError(f"{path}: {key} is missing")
+    for key in DEVIATIONS:
+        if not isinstance(given.get(key, {}), dict):
+            wrong = f"{key}: expected a table such as {{ phi = 0.02 }}, got {show(given[key])}"
+    name, about, further = given["name"], given.get("description", ""), given.get("sigma", [])
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        wrong = f"name: expected a letter, then letters, digits, _, got {show(name)}"
+    if not isinstance(about, str):
+        wrong = f"description: expected a text, got {show(about)}"
+    if not isinstance(further, list) or not all(isinstance(name, str) for name in further):
+        wrong = f"sigma: expected a list of outputs, got {show(further)}"
+    if wrong:
+        raise UserError(f"{path}: {wrong}")
 
 
 def _plant(path: Path, given: object) -> tuple[ModelFile, dict[str, Any]]:
@@ -118,32 +128,24 @@ def _plant(path: Path, given: object) -> tuple[ModelFile, dict[str, Any]]:
     return plant, tables
 
 
-def _known(plant: ModelFile, key: str) -> dict[str, Variable]:
-    """Return the variables that a key may name."""
-    sections = {
-        "measure": ("states", "outputs"), "noise": ("inputs",), "start": ("states",),
-        "unknown": ("parameters",),
-    }  # fmt: skip
-    return {v.name: v for v in plant.of(*sections[key]) if v.is_real}
-
-
-def _variable(
-    path: Path, key: str, name: str, known: Mapping[str, Variable], what: str, plant: ModelFile
-) -> Variable:
+def _variable(path: Path, key: str, name: str, plant: ModelFile) -> Variable:
+    """Return the variable that a key names; UserError for one that it cannot name."""
+    sections, what = NAMED[key]
+    known = {v.name: v for v in plant.of(*sections) if v.is_real}
     if name in known:
-        variable = known[name]
         if key == "unknown" and "[" in name:
             raise UserError(f"{path}: unknown: {name}: elements of arrays cannot be estimated")
-        return variable
-    other = plant.variables.get(name)
-    if other is not None:
-        where = "a parameter that follows from others" if other.section == FOLLOWS else "one"
-        where = f"of {other.place}" if where == "one" else where
-        raise UserError(f"{path}: {key}: {name} is {where}, expected {what} of {plant.path.name}")
-    guess = did_you_mean(name, known)
-    raise UserError(
-        f"{path}: {key}: {plant.path.name} has no such {what.split()[1]}: {name}{guess}"
-    )
+        return known[name]
+    other, wanted = plant.variables.get(name), f"expected {what} of {plant.path.name}"
+    if other is None:
+        guess = did_you_mean(name, known)
+        what = what.split()[1]
+        raise UserError(f"{path}: {key}: {plant.path.name} has no such {what}: {name}{guess}")
+    follows = other.section == FOLLOWS
+    where = "a parameter that follows from others" if follows else f"of {other.place}"
+    if other.section in sections or not other.is_real:
+        where = "no real number"
+    raise UserError(f"{path}: {key}: {name} is {where}, {wanted}")
 
 
 def _positive(path: Path, place: str, given: object, variable: Variable | None) -> float:

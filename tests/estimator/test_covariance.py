@@ -61,7 +61,7 @@ def kalman(u: np.ndarray, y: np.ndarray, first: int) -> tuple[np.ndarray, np.nda
 @pytest.mark.parametrize("offset", [0.0, PERIOD])
 def test_a_linear_plant_has_the_matrices_of_kalman(offset: float, tmp_path: Path) -> None:
     random = np.random.default_rng(3)
-    u, y = random.normal(size=(101, 2)), random.normal(size=(101, 2))
+    u, y = random.normal(size=(31, 2)), random.normal(size=(31, 2))
     states, covariances = kalman(u, y, round(offset / PERIOD))
     with filter_of(LINEAR, OF_LINEAR + (f"offset = {offset}" if offset else ""), tmp_path) as slave:
         for method in (1, 2, 3, 4):
