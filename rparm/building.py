@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from rparm import build_cache, project
 from rparm.errors import UserError, one_line
@@ -16,6 +17,7 @@ from rparm.files import read_toml, whole, written
 from rparm.interruption import run_group, temporary_folder, uninterrupted
 
 EQUATIONS = ".toml"  # suffix of their files
+ESTIMATOR = "estimator"  # the key of a file from which equations are made
 WARNINGS = "warnings"  # what is kept beside the files
 WARNING, NOTE = "warning: ", "note: "  # how its lines begin
 
@@ -58,19 +60,40 @@ def build(
         NAME.fmu of FMI 2.0 and fmi3/NAME.fmu of FMI 3.0.
     """
     project.check_installed(NEEDED, "build")
+    file, tables = Path(file), {}
     with suppress(OSError, ValueError, RecursionError):  # the program says what is wrong with them
-        text = Path(file).read_text(encoding="utf-8")
-        project.refuse_other(Path(file), tomllib.loads(text), "build")
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+        project.refuse_other(file, tables, "build")
     runtimes = project.runtimes(platforms, web)
-    with temporary_folder() as work:
-        of_this_machine = not (platforms or web)
-        kept, *fmus = _kept(Path(file), runtimes, of_this_machine, gradients, work, notes=lock)
+    with temporary_folder() as work, _equations(file, tables) as equations:
+        options = not (platforms or web), gradients, work
+        kept, *fmus = _kept(equations, file, runtimes, *options, notes=lock)
         paths = Path(output) / fmus[0], Path(output) / fmus[1]
         # the cache may have it from a file of another name
         keeps = lock and not gradients  # which are not of the file
-        made = {_lock(Path(file)): work / kept} if keeps else {}
+        made = {_lock(file): work / kept} if keeps else {}
         _put(made | dict(zip(paths, (work / name for name in fmus), strict=True)))
     return paths
+
+
+@contextmanager
+def _equations(file: Path, tables: dict[str, Any]) -> Iterator[Path]:
+    """Yield a file with equations: this one, or what is made of that of an estimator."""
+    if ESTIMATOR not in tables:
+        yield file
+        return
+    from rparm.estimator.equations import write  # takes long
+
+    with temporary_folder() as folder:
+        equations = folder / file.name
+        for warning in write(file, equations):
+            print(f"{WARNING}{file}: {warning}", file=sys.stderr)
+        if _lock(file).is_file():
+            shutil.copyfile(_lock(file), _lock(equations))
+        try:
+            yield equations
+        except UserError as error:
+            raise UserError(f"{error}".replace(str(equations), str(file))) from None
 
 
 def is_equations(file: Path) -> bool:
@@ -96,6 +119,7 @@ def _lock(file: Path) -> Path:
 
 def _kept(
     file: Path,
+    shown: Path,
     runtimes: list[Path],
     of_this_machine: bool,
     gradients: Sequence[str],
@@ -104,7 +128,7 @@ def _kept(
 ) -> list[str]:
     """Make the lock file and the FMUs in the folder `work`, or take them from the cache.
 
-    notes: whether those are printed, not only warnings.
+    shown: the file of the user. notes: whether those are printed, not only warnings.
     """
     cache = build_cache.of_user()
 
@@ -130,7 +154,7 @@ def _kept(
     for line in warnings.splitlines():
         kind = NOTE if line.startswith(NOTE) else WARNING
         if notes or kind == WARNING:
-            print(line.replace(kind, f"{kind}{file}: ", 1), file=sys.stderr)
+            print(line.replace(kind, f"{kind}{shown}: ", 1), file=sys.stderr)
     for name, content in found.items():
         (work / name).parent.mkdir(exist_ok=True)
         (work / name).write_bytes(content)

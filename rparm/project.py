@@ -59,7 +59,7 @@ NO_CACHE = "RPARM_NO_CACHE"  # variable of the environment, which --no-cache set
 
 
 EQUATIONS = {"states", "discrete", "sampled", "algebraic", "where", "outputs"}
-EQUATIONS |= {"experiment", "modes"}
+EQUATIONS |= {"experiment", "modes", "estimator"}
 VARIABLE = re.compile(r"\s*\w+(\.\w+|\[[\d,\s]+\])+\s*")
 OF_LOOP = {
     "start",

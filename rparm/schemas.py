@@ -68,5 +68,5 @@ def _of_file(name: str) -> Schema:
 
 KINDS: dict[str, Callable[[], Schema]] = {
     "model": _of_models, "scenario": partial(_of_file, "scenario"), "campaign": _of_campaigns,
-    "loop": partial(_of_file, "loop"),
+    "loop": partial(_of_file, "loop"), "estimator": partial(_of_file, "estimator"),
 }  # fmt: skip

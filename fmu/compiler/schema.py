@@ -133,6 +133,7 @@ def _further(named: Schema) -> dict[str, Schema]:
         },
         "include": {"type": "array", "items": TEXT | {"pattern": f"^{INCLUDED.pattern}$"}},
         "code": {"anyOf": [CODE, {"type": "array", "items": CODE, "minItems": 1}]},
+        "calculate": TEXT,
         "sizes": _by_name(size, named, has_indexes=False),
         "units": {"type": "object", "additionalProperties": unit},
         "tables": _by_name(_data(), of_functions, has_indexes=False),

@@ -1,4 +1,4 @@
-"""`build` and `new-model`: files with equations."""
+"""`build`, `estimator` and `new-model`: files with equations, and those from which they follow."""
 
 import argparse
 import re
@@ -7,10 +7,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from rparm import project
-from rparm.building import NEEDED, build
+from rparm.building import ESTIMATOR, NEEDED, build
 from rparm.command_line import Ended
 from rparm.errors import UserError
-from rparm.files import NAME, check_for_windows, create, written
+from rparm.files import NAME, check_for_windows, create, read_toml, written
 
 SUFFIX = ".toml"
 COMMA = re.compile(r",(?![^[(]*[])])")  # none within brackets
@@ -42,6 +42,25 @@ def do_new_model(options: argparse.Namespace) -> Ended:
         create(of_schema, text)
     verdict = f"{path}: written; {project.PROGRAM} build {shlex.quote(str(path))} makes FMUs of it"
     return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())
+
+
+def do_estimator(options: argparse.Namespace) -> Ended:
+    file, kept = options.file, options.toml
+    if ESTIMATOR not in read_toml(file):
+        wanted = f'expected one of an estimator, with {ESTIMATOR} = "plant.toml"'
+        raise UserError(f"{file}: {wanted}; {project.PROGRAM} build takes a plant's")
+    paths = build(file, output=options.output or Path(), platforms=options.platforms)
+    document: dict[str, object] = {"fmus": [path.absolute() for path in paths]}
+    if kept:
+        from rparm.estimator.equations import write  # takes long
+
+        if kept.suffix != SUFFIX or kept.exists() and kept.samefile(file):
+            raise UserError(f"--toml: expected another file {SUFFIX}, got {kept}")
+        with written(kept):
+            write(file, kept)
+        document["equations"] = kept.absolute()
+    also = f"; {kept}: written" if kept else ""
+    return Ended(0, f"{' and '.join(map(str, paths))}: built{also}", document)
 
 
 def do_build(options: argparse.Namespace) -> Ended:

@@ -36,7 +36,11 @@ FILES = {
     ],
     "scenario": sorted(ROOT.glob("models/*/scenarios/*.toml")),
     "campaign": sorted(ROOT.glob("models/*/campaigns/*.toml")),
-    "loop": sorted(ROOT.glob("models/*/loop.toml")),
+    "loop": [
+        *sorted(ROOT.glob("models/*/loop.toml")),
+        ROOT / "examples" / "estimator" / "loop.toml",
+    ],
+    "estimator": [ROOT / "examples" / "estimator" / "observer.toml"],
 }
 VALUES = (0, -1, 1e999, 1.5, True, "", "x", "1", "a b", [], [1, 2], ["x"], {}, {"x": "1"})
 # messages of the mistakes that show without the meaning of texts

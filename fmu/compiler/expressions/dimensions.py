@@ -10,7 +10,7 @@ from fractions import Fraction
 
 from .. import units as si
 from ..units import BASE, Exponents
-from .expression import EQUALITIES, RELATIONS, ExpressionError, Node, in_order
+from .expression import EQUALITIES, PARTIAL, RELATIONS, ExpressionError, Node, in_order
 from .parser import AS_SECOND, table_unit
 
 Dimension = tuple[Fraction, ...]  # exponents, in the order of BASE
@@ -64,7 +64,7 @@ def _dimension(
         return given[0]
     if ANY in given and node.op not in SAME:
         return ANY
-    if node.op in ("*", "/"):
+    if node.op in ("*", "/", PARTIAL):
         power = Fraction(1 if node.op == "*" else -1)
         if given == [None, None]:
             return None

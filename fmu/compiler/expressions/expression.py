@@ -26,6 +26,7 @@ TOO_LARGE = f"functions and sums make more than {MOST_OPERATIONS} operations of 
 # functions over a range -> the operations that they are until `at_indexes` has replaced them
 OVER_RANGES = {name: f"{name} over" for name in ("sum", "min", "max", "any", "all")}
 DERIVATIVE = "der"  # of a state, in front of a bracket
+PARTIAL = "partial"  # derivative of an expression by a name
 SHOWN = 30  # characters of the text in a message
 # how tightly operators bind
 CONDITIONAL, OR, AND, NOT, RELATION, SUM, PRODUCT, SIGN, POWER = range(1, 10)
@@ -81,8 +82,8 @@ class Node:
     (then `name`), "text" (`name`, an item of an enumeration), "table" (a look-up in the table
     `name`), "call" (of the function `name`), "unit" (its first argument, in the unit `name`), an
     operator of `RELATIONS` or `EQUALITIES`, + - * / **, "negative", "and", "or", "not", "if"
-    (arguments: condition, value if true, otherwise), "floor", "hypot", or a name of `FUNCTIONS`.
-    min and max have two arguments here.
+    (arguments: condition, value if true, otherwise), "floor", "hypot", `PARTIAL` (arguments: what
+    is derived, by which name), or a name of `FUNCTIONS`. min and max have two arguments here.
     "element" of an array by indexes that follow from variables (arguments: the indexes; `name` has
     {} where they come; behind them, once `with_elements` has added them, the elements in `of`).
     Until `at_indexes` has replaced them: other elements, and `OVER_RANGES` of the `body` over the
@@ -138,6 +139,7 @@ def written(root: Node) -> str:
         match node.op:
             case "number":
                 text = f"{node.value:.12g}"
+                text = text if float(text) == node.value else repr(node.value)
             case "literal":
                 text = "true" if node.value else "false"
             case "name":

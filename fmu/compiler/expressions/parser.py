@@ -19,6 +19,7 @@ from .expression import (
     NOT,
     OR,
     OVER_RANGES,
+    PARTIAL,
     POWER,
     RANDOM,
     RELATION,
@@ -349,9 +350,11 @@ class _Parser:
             return self.derivative()
         if self.has_range(function.text):
             return self.over_range(function)
+        if function.text == PARTIAL and PARTIAL not in self._functions:
+            return self.partial(function)
         further = self._functions.get(function.text)
         if function.text not in FUNCTIONS and further is None:
-            known = [*FUNCTIONS, *self._functions, DERIVATIVE, "sum", "any", "all"]
+            known = [*FUNCTIONS, *self._functions, DERIVATIVE, PARTIAL, "sum", "any", "all"]
             text = f"no function {function.shown}{meant(function.text, known)}"
             raise ExpressionError(function.column, f"{text} (known: {', '.join(known)})")
         arguments = []
@@ -399,6 +402,18 @@ class _Parser:
         if state.kind != "name":
             raise ExpressionError(state.column, f"expected a state, got {state.shown}")
         found = self.variable(state, derivative_of("{}"))
+        self.expect(")")
+        return found
+
+    def partial(self, function: Token) -> Node:
+        """Parse an expression and the name by which it is derived."""
+        self.expect("(")
+        root = self.expression(CONDITIONAL)
+        self.expect(",")
+        by = self.take()
+        if by.kind != "name":
+            raise ExpressionError(by.column, f"expected a name to derive by, got {by.shown}")
+        found = Node(PARTIAL, function.column, (root, self.variable(by)))
         self.expect(")")
         return found
 

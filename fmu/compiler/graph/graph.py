@@ -17,11 +17,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
-from ..expressions.expression import RANDOM, RELATIONS, Node, in_order
+from ..expressions.expression import PARTIAL, RANDOM, RELATIONS, Node, in_order
 from ..expressions.parser import parse
 from . import algebraic, undefined
 from .algebraic import GIVEN, UNKNOWN, Linear, System
 from .contacts import Contacts
+from .derived import derived
 from .tables import FAR, LookupTable
 
 ENDS = ("bounds", "ends")  # arrays of a table: where segments begin and end
@@ -234,6 +235,8 @@ class Graph:
                     value = self.functions[node.name](given, is_instant)
                 case "unit":
                     value = given[0]
+                case op if op == PARTIAL:
+                    value = derived(self, node, *given)
                 case op:
                     value = (relate if op in RELATIONS else self.value)(op, *given)
             found[node] = value

@@ -265,6 +265,7 @@ class ModelFile:
     functions: dict[str, Function | Lookup] = field(default_factory=dict)
     tables: dict[str, LookupTable] = field(default_factory=dict)
     code: CodeFile | None = None
+    calculating: str = ""  # the function that writes variables, if not NAME_calculate
     parts: dict[str, ModelFile] = field(default_factory=dict)  # components, as they were read
     without_units: set[str] = field(default_factory=set)  # variables of components without any
     header: Any = None  # of its struct of values, if it has C
@@ -336,7 +337,7 @@ class ModelFile:
     @property
     def calculate(self) -> str:
         """The function of C that writes variables without a value; empty if there is none."""
-        name = f"{self.path.stem}_calculate"
+        name = self.calculating or f"{self.path.stem}_calculate"
         return name if self.code and name in self.code.program.functions else ""
 
     @property

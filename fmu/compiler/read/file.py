@@ -68,7 +68,7 @@ def read_tables(
         experiment = _experiment(keys.entries(head.get("experiment", {}), keys.EXPERIMENT))
     reserved = keys.RESERVED | set(reserved)
     file = ModelFile(head["name"], head.get("description", ""), experiment, path, text, reserved)
-    file.is_by_hand = is_by_hand
+    file.is_by_hand, file.calculating = is_by_hand, head.get("calculate", "")
     file.indicators = head.get("indicators", [])
     file.time_events = head.get("time_events", False)
     for size, number in head.get("sizes", {}).items():

@@ -69,7 +69,7 @@ class Field:
 
     def places(self) -> Iterator[tuple[Place, str]]:
         """Yield the places of variables, from the field or its group."""
-        inside = (self.group, self.name) if self.group else (self.name,)
+        inside = (*filter(None, self.group.split(".")), self.name)
         for name, indexes in self.elements:
             yield (*inside, *indexes), name
 

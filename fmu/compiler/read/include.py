@@ -58,7 +58,7 @@ def source_of(path: Path, above: tuple[Path, ...] = ()) -> Source:
     for source in included:
         folder = Path(os.path.relpath(source.path.parent, path.parent))
         given = {key: value for key, value in source.tables.items() if key not in HEADS}
-        tables = _merged(tables, _moved(given, folder))
+        tables = _merged(tables, moved(given, folder))
     return Source(path, text, _merged(tables, own), tuple(included))
 
 
@@ -99,7 +99,7 @@ def _merged(below: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _moved(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
+def moved(tables: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return tables whose paths begin at another folder, from which `folder` leads to theirs."""
     found = dict(tables)
     code = found.get("code")

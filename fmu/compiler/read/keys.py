@@ -31,7 +31,7 @@ MOST_SIZE = 20_000
 LONGEST_TEXT = 1000  # characters of a description
 LONGEST_MESSAGE = 500  # bytes: src/instance/state.c has no room for more
 NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
-FIELD = re.compile(r"([A-Za-z_][A-Za-z0-9_]*\.)?[A-Za-z_][A-Za-z0-9_]*(\[[0-9]\])*")
+FIELD = re.compile(r"([A-Za-z_][A-Za-z0-9_]*\.)*[A-Za-z_][A-Za-z0-9_]*(\[[0-9]\])*")
 CODE = re.compile(r'[^\x00-\x1f\\"]+\.[ch]')
 # files that Windows cannot have, with any suffix
 DEVICE = re.compile("(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])")
@@ -66,7 +66,7 @@ NOT_REAL |= {section: section for section in CALCULATED}
 HEAD = (
     *("name", "description", "include", "experiment", "modes", "code", "sizes", "units", "tables"),
     *("functions", "sampled", "events", "friction", "stops", "check", "terminals", "hook"),
-    *("components", "connections", "gradients"),
+    *("components", "connections", "calculate", "gradients"),
     *SECTIONS,
 )
 EXPERIMENT = {"stop": 10.0, "step": 0.01, "tolerance": 1e-8}
@@ -81,7 +81,7 @@ GRADIENTS = ("by", "of")
 HOOK = ("sources", "indicators", "series", "reads", "reach")
 SAMPLER = ("every", "offset", "while", "where", "reinit", "set")
 LARGEST_INTEGER = 2**31 - 1
-NO_TABLES = ("name", "description", "include", "modes", "code")
+NO_TABLES = ("name", "description", "include", "modes", "code", "calculate")
 # of a file without equations, whose variables C by hand calculates
 BY_HAND = ("name", "description", "include", "experiment", "sizes", "units", "terminals")
 BY_HAND += ("indicators", "time_events", *SECTIONS)
@@ -235,7 +235,7 @@ READ = {
     **dict.fromkeys(("sources", "indicators", "series", "by", "of"), LIST),
     "reads": _expect("a table", dict, lambda _: True),
     "reach": _expect("true or false", bool, lambda _: True),
-    **dict.fromkeys(("file", "derivative_of"), TEXT),
+    **dict.fromkeys(("file", "derivative_of", "calculate"), TEXT),
 }  # how values of keys are read; others are expressions
 
 

@@ -1,0 +1,1 @@
+"""Estimators: extended Kalman filters that are made from a plant's file with equations."""

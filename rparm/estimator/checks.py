@@ -1,0 +1,137 @@
+"""What a filter cannot find, and what is allowed, but may not be meant.
+
+Which states and parameters measurements show follows from the slopes of y, L_f y, L_f^2 y, ... by
+all that is estimated, at points near the start, with inputs that rest: what lies in their null
+space changes no measurement (Hermann and Krener, 1977). There is no answer where an operation has
+no value here, such as a table.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from rparm.errors import UserError
+from rparm.estimator.request import Request
+from rparm.estimator.terms import Terms
+from rparm.fmu_tools.compiler.expressions.expression import OPERATIONS, RELATIONS, in_order, names
+from rparm.fmu_tools.compiler.graph.graph import Value
+
+MOST_OPERATIONS = 20_000
+POINTS = 3  # at each the rank may be lower by chance
+RELATIVE, PART = 1e-9, 1e-6  # singular values, and parts of vectors, that count as 0
+MOVED = (0.15, 0.3)  # how far inputs and states are from the start, of their size
+OF_DOUBLES = OPERATIONS | {
+    "if": lambda condition, a, b: a if condition else b, "pow": math.pow, "isnan": math.isnan,
+    "isfinite": math.isfinite, "value_of": lambda x: x, "moving_as": lambda x, _: x,
+    "slopes_scaled": lambda slope, d: slope * d if d else 0.0, "slopes_bounded": lambda x: x,
+    "slopes_product": lambda a, b, _: a * b if b else 0.0,
+}  # fmt: skip
+
+
+def check(terms: Terms) -> list[str]:
+    """Return warnings; UserError for what a filter cannot find."""
+    request, plant = terms.request, terms.plant
+    for name in request.measure:
+        if not terms.h[name]:
+            raise UserError(f"{request.path}: measure: {name}: no state of the plant moves it")
+        if not any(terms.p(x, y) for x in terms.h[name] for y in terms.estimated):
+            what = "nothing that moves it has a spread: give start, unknown or noise"
+            raise UserError(f"{request.path}: measure: {name}: {what}")
+    unseen, measured = _unseen(request), ", ".join(request.measure)
+    if unknown := [x for x in unseen if x in request.unknown]:
+        what = f"{', '.join(unknown)} cannot be told from {measured}: other values fit as well"
+        raise UserError(f"{request.path}: unknown: {what}")
+    found = [*_of_changes(terms)]
+    if unseen:
+        found.append(f"measure: {measured} does not show {', '.join(unseen)}: sigma may grow")
+    if plant.modes:
+        what = "not measured, the filter takes it from its estimate"
+        found.append(f"{plant.path.name}: mode {', '.join(plant.modes)}: {what}")
+    return found
+
+
+def _of_changes(terms: Terms) -> Iterator[str]:
+    """Yield warnings of events that may happen again, and of held values taken as exact."""
+    file = terms.plant.path.name
+    for event in terms.plant.events:
+        nodes = in_order([e.tree for e in event.conditions])
+        moving = [n for n in nodes if n.op in RELATIONS and terms.moving(names(n))]
+        if len(moving) == 1 and event.reinit:
+            what = "an update may pass its limit from the other side, and it happens again"
+            yield f'{file}: [events.{event.name}]: {what}: write while with a direction, as "v < 0"'
+    for change in terms.plant.changes:
+        for name, new in change.set.items():
+            variable = terms.plant.variables.get(name)
+            if variable and variable.is_real and terms.moving(names(new.tree)):
+                what = "follows from states, the filter takes it as exact"
+                yield f"{file}: [discrete]: {name}: {what}"
+
+
+def _unseen(request: Request) -> list[str]:
+    """Return names of what no measurement shows; none if that is not known."""
+    graph, plant = request.plant.graph, request.plant
+    estimated = [*plant.of("states"), *(plant.variables[name] for name in request.unknown)]
+    rates = {v.leaf: v.value for v in plant.of("states")}
+    scales = np.array([abs(v.start or 0.0) or v.nominal or 1.0 for v in estimated])
+    measured = [plant.variables[name] for name in request.measure]
+    rows = [v.leaf or v.value for v in measured]
+    random, zero = np.random.default_rng(0), graph.number(0.0)
+    points = [_point(request, random) for _ in range(POINTS)]
+    slopes: list[list[Value]] = []
+    missing: list[str] = []
+    for _ in estimated:
+        found = graph.gradients(rows, [v.leaf for v in estimated])
+        slopes += [[row.get(v.leaf, zero) for v in estimated] for row in found]
+        if len(in_order([value for row in slopes for value in row])) > MOST_OPERATIONS:
+            return []
+        known = [m for m in (_numbers(slopes, point, request) for point in points) if m is not None]
+        null = [_null(matrix * scales, [v.name for v in estimated]) for matrix in known]
+        missing = min(null, key=len, default=[])
+        if not missing:
+            return []
+        rows = graph.derivatives(rows, rates)
+    return missing
+
+
+def _null(matrix: np.ndarray, columns: Sequence[str]) -> list[str]:
+    """Return which columns have a part in the null space of a matrix (rows, columns)."""
+    lengths = np.linalg.norm(matrix, axis=1, keepdims=True)
+    _, sizes, right = np.linalg.svd(matrix / np.where(lengths > 0, lengths, 1.0))
+    rank = int(np.sum(sizes > RELATIVE))
+    parts = np.abs(right[rank:]).max(axis=0, initial=0.0)
+    return [name for name, part in zip(columns, parts, strict=True) if part > PART]
+
+
+def _point(request: Request, random: np.random.Generator) -> dict[tuple[str, str], float]:
+    """Return values of leaves, by operation and name."""
+    found = {("time", ""): 0.0}
+    for v in request.plant.variables.values():
+        if v.leaf is not None:
+            start = float(v.start or 0.0)
+            moves = v.section in ("inputs", "states") or v.name in request.unknown
+            size = (abs(start) or v.nominal or 1.0) * random.uniform(*MOVED)
+            found[v.leaf.op, v.name] = start + moves * size
+    return found | {("mode", name): float(start) for name, start in request.plant.modes.items()}
+
+
+def _numbers(
+    slopes: Sequence[Sequence[Value]], point: Mapping[tuple[str, str], float], request: Request
+) -> np.ndarray | None:
+    """Evaluate slopes; None where an operation is not known or not defined."""
+    relations, found = request.plant.graph.relations, {}
+    roots = [value for row in slopes for value in row]
+    with suppress(KeyError, ArithmeticError, ValueError):
+        for value in in_order([*(r.distance for r in relations.values()), *roots]):
+            if value.op == "number":
+                found[value] = value.number
+            elif value.arguments:
+                found[value] = OF_DOUBLES[value.op](*(found[a] for a in value.arguments))
+            elif value.op == "mode" and value.name in relations:
+                found[value] = found[relations[value.name].distance] > 0
+            else:
+                found[value] = point[value.op, value.name]
+        matrix = np.array([[found[value] for value in row] for row in slopes])
+        return matrix if np.isfinite(matrix).all() else None
+    return None

@@ -1,0 +1,110 @@
+"""Mistakes in files of estimators, plants that have no filter, and warnings: a line each."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from rparm.building import build
+from rparm.errors import UserError
+from rparm.estimator.equations import write
+from tests.support.programs import RPARM, python
+
+PLANT = """name = "Pendulum"
+[parameters]
+m = { start = 1.0, unit = "kg" }
+l = { start = 1.0, unit = "m" }
+k = { value = "m * l", unit = "kg.m" }
+[inputs]
+torque = { unit = "N.m" }
+[states]
+phi = { start = 1.0, unit = "rad", derivative = "omega" }
+omega = { unit = "rad/s", derivative = "(torque - k * 9.81[m/s2] * sin(phi)) / (m * l**2)" }
+[where]
+half = "phi / 2"
+"""
+REQUEST = """name = "Observer"
+estimator = "plant.toml"
+every = "20 ms"
+measure = { phi = "0.02 rad" }
+noise = { torque = "0.05 N.m" }
+start = { phi = "0.2 rad" }
+"""
+MISTAKES = tomllib.loads(Path(__file__).with_name("mistakes.toml").read_text(encoding="utf-8"))
+
+
+def refused(folder: Path, plant: str, request: str) -> str:
+    (folder / "plant.toml").write_text(plant, encoding="utf-8")
+    file = folder / "estimator.toml"
+    file.write_text(request, encoding="utf-8")
+    with pytest.raises(UserError) as error:
+        write(file, folder / "equations.toml")
+    place, text = str(error.value).split(": ", 1)
+    assert place == str(file)
+    return text.replace(str(folder), "FOLDER")
+
+
+def refuses(rows: list[list[str]]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize(("old", "new", "message"), rows, ids=[row[2] for row in rows])
+
+
+@refuses(MISTAKES["request"])
+def test_a_mistake_is_named(old: str, new: str, message: str, tmp_path: Path) -> None:
+    assert old in REQUEST
+    assert refused(tmp_path, PLANT, REQUEST.replace(old, new)) == message
+
+
+@refuses(MISTAKES["plant"])
+def test_a_plant_without_a_filter_is_refused(
+    old: str, new: str, message: str, tmp_path: Path
+) -> None:
+    plant = PLANT.replace(old, new) if old else PLANT + new
+    unknown = 'unknown = { m = "0.1 kg", l = "1 cm" }\n'
+    assert refused(tmp_path, plant, REQUEST + unknown) == message
+
+
+def test_what_may_not_be_meant_is_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "plant.toml").write_text(
+        """name = "Ball"
+modes = ["resting"]
+[states]
+h = { start = 1, derivative = "v" }
+v = { derivative = "u - 9.81" }
+x = { derivative = "v" }
+[discrete]
+u = {}
+[events.impact]
+when = "h < 0"
+reinit = { v = "-v" }
+[sampled.law]
+every = "0.1"
+set = { u = "-v" }
+""",
+        encoding="utf-8",
+    )
+    file = tmp_path / "estimator.toml"
+    text = 'name = "O"\nestimator = "plant.toml"\nevery = 0.1\nmeasure = { h = 0.1 }\n'
+    text += "start = { v = 1 }"
+    file.write_text(text, encoding="utf-8")
+    assert write(file, tmp_path / "equations.toml") == [
+        "plant.toml: [events.impact]: an update may pass its limit from the other side, and it "
+        'happens again: write while with a direction, as "v < 0"',
+        "plant.toml: [discrete]: u: follows from states, the filter takes it as exact",
+        "measure: h does not show x: sigma may grow",
+        "plant.toml: mode resting: not measured, the filter takes it from its estimate",
+    ]
+
+
+def test_the_command_wants_an_estimator_and_keeps_its_equations(tmp_path: Path) -> None:
+    """FMUs of the kept equations have the same bits; the lock file is the estimator's."""
+    for name, text in {"plant": PLANT, "estimator": REQUEST}.items():
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    ran = python(*RPARM, "estimator", "plant.toml", folder=tmp_path)
+    assert ran.returncode == 2 and "plant.toml: expected one of an estimator" in ran.stderr
+    arguments = ("--output", "out", "--toml", "kept/filter.toml")
+    ran = python(*RPARM, "estimator", "estimator.toml", *arguments, folder=tmp_path)
+    assert (ran.returncode, ran.stderr) == (0, ""), ran.stderr
+    build(tmp_path / "kept" / "filter.toml", output=tmp_path / "again")
+    for name in ("Observer.fmu", "fmi3/Observer.fmu"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
+    assert (tmp_path / "estimator.lock.toml").is_file()
