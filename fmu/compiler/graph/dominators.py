@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..expressions.expression import in_order
+from .algebraic import SEVERAL
 from .graph import STILL, Graph, Value
 
 
@@ -60,6 +61,7 @@ def _first_dominators(roots: list[Value], seeds: Mapping[Value, Value]) -> dict[
             first[y] = y
         elif y.op not in STILL:
             moving = {first[argument] for argument in y.arguments if argument in first}
+            is_single = len(moving) == 1 and y.op not in (*SEVERAL, "component")
             if moving:
-                first[y] = moving.pop() if len(moving) == 1 else y
+                first[y] = moving.pop() if is_single else y
     return first
