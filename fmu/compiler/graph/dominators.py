@@ -14,6 +14,9 @@ from ..expressions.expression import in_order
 from .algebraic import SEVERAL
 from .graph import STILL, Graph, Value
 
+# vectors, and values that may not be defined where another branch is taken: 0 times these is no 0
+APART = (*SEVERAL, "component", "if")
+
 
 class Slopes:
     """Derivatives of values by others that they follow from, each made once."""
@@ -61,7 +64,7 @@ def _first_dominators(roots: list[Value], seeds: Mapping[Value, Value]) -> dict[
             first[y] = y
         elif y.op not in STILL:
             moving = {first[argument] for argument in y.arguments if argument in first}
-            is_single = len(moving) == 1 and y.op not in (*SEVERAL, "component")
+            is_single = len(moving) == 1 and y.op not in APART
             if moving:
                 first[y] = moving.pop() if is_single else y
     return first
