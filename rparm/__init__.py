@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         Table,
         build,
         fmu,
+        gradient,
         identify,
         linearize,
         run_campaign,
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "Scenario", "System", "Table", "build", "fmu", "identify", "linearize", "run_campaign",
-    "simulate",
+    "Scenario", "System", "Table", "build", "fmu", "gradient", "identify", "linearize",
+    "run_campaign", "simulate",
 ]  # fmt: skip
 
 

@@ -293,6 +293,19 @@ def is_built(path: Path, folder: Path) -> bool:
     return is_here and is_built_from(path.stem, folder)
 
 
+def equations(fmu: Path) -> Path | None:
+    """Return the file with the equations of an FMU of the project, or such a file; or None."""
+    if fmu.suffix.lower() == ".toml":
+        return fmu
+    is_shipped = INSTALLED and fmu.resolve().is_relative_to(cache_folder("files").resolve())
+    for folder in models().values():
+        file = folder / f"{folder.name}.toml"
+        is_from = is_built_from(fmu.stem, folder) if is_shipped else is_built(fmu, folder)
+        if is_from and file.is_file():
+            return file
+    return None
+
+
 def fmu_of(subject: Path, option: str = "", version: str = VERSIONS[0]) -> Path:
     """Return the FMU of a scenario's subject: a file itself, or built from a model's folder."""
     return built(subject, ".fmu", option, version) if subject.is_dir() else subject
