@@ -1,13 +1,14 @@
 """Identification in one call, from the request to the results, and validation by another log."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from rparm import gradients
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
@@ -239,9 +240,21 @@ def _read(request: Request, known: Checked, path: Path) -> Recording:
 
 def identify(fmu: Fmu, request: Request) -> Identification:
     """Fit parameters of an FMU to logs; UserError if the request, a log or a run is wrong."""
+    with ExitStack() as stack:
+        return _identified(fmu, request, stack)
+
+
+def _identified(fmu: Fmu, request: Request, stack: ExitStack) -> Identification:
     known = checked(request, fmu)
     recordings = [_read(request, known, path) for path in request.logs]
     noise, notes = logs.noise(recordings), []
+    with_gradients = None
+    try:
+        by = [*known.names, *map("start({})".format, state_names(fmu))]
+        with_gradients = gradients.opened(fmu, [*known.outputs], by, stack)
+    except UserError as error:
+        notes.append(f"Derivatives are difference quotients: {error}.")
+    known = replace(known, with_gradients=with_gradients)
     fitted = _fitted(fmu, request, known, recordings, noise)
     if any(recording.filled for recording in recordings):
         filled = [recording.filled or recording for recording in recordings]
@@ -407,7 +420,8 @@ def _problem(
     estimated = [name for name in parameters.names if name != DELAY]
     names = list(known.reals), list(known.switches), list(known.outputs)
     states = state_names(fmu)
-    with Simulator(fmu, estimated, states, *names, settings, request.tolerance) as simulator:
+    given = fmu, estimated, states, *names, settings, request.tolerance, known.with_gradients
+    with Simulator(*given) as simulator:
         guessed = guess_start(fmu, segments, names[2], known.starts)
         guessed = admitted_start(simulator, segments, parameters, guessed)
         scales = start_scales(guessed)
