@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -105,9 +106,12 @@ class Declaration:
 
     @property
     def naming(self) -> str:
-        """Whether names have indexes or belong to components."""
+        """Whether names have indexes or belong to components; no structured name goes on behind an
+        index, as x[2]_by_k does.
+        """
         has_parts = any("[" in name or "." in name for name in self.variables)
-        return "structured" if has_parts else "flat"
+        is_legal = not any(re.search(r"\]\w", name) for name in self.variables)
+        return "structured" if has_parts and is_legal else "flat"
 
     @property
     def guid(self) -> str:

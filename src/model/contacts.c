@@ -6,7 +6,7 @@
 
 static const double drift = 1e-10; // of a velocity that is held, between events, over its terms
 
-static struct contacts_measured measured_in(const struct contacts *model, double *room) {
+struct contacts_measured contacts_measured_in(const struct contacts *model, double *room) {
     const ptrdiff_t directions = model->direction_count, contacts = model->contact_count;
     double *of_contacts = room + 6 * directions;
     double *others = of_contacts + 13 * contacts;
@@ -172,7 +172,7 @@ static struct work work_of(const struct call *call, const struct event *event) {
     const struct contacts_room room = call->room.contacts;
     const ptrdiff_t directions = model->direction_count;
     struct work work = {.call = call, .model = model, .event = event};
-    work.now = measured_in(model, room.measured);
+    work.now = contacts_measured_in(model, room.measured);
     work.hold = room.hold;
     work.acceleration = work.hold + directions;
     work.before = work.acceleration + directions;
@@ -234,6 +234,9 @@ enum status contacts_update(const struct call *call, const struct event *event, 
     write_modes(&work);
     if (contacts_break_away(&work)) {
         write_modes(&work);
+    }
+    if (work.model->hold_gradients != NULL) {
+        work.model->hold_gradients(&work);
     }
     *changes |= work.jumps;
     for (int e = 0; e < work.model->contact_count; e++) {

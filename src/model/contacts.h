@@ -15,6 +15,7 @@
 struct call;
 struct given;
 struct compared;
+struct work;
 
 enum { CONTACTS_MOST_COUPLED = 8 };
 
@@ -70,6 +71,15 @@ struct contacts {
     /* Writes all of `to`. tolerance: of each state, in its unit. */
     void (*measure)(const void *values, double t, const double tolerance[],
                     const struct contacts_measured *to);
+    /* Writes derivatives of velocities, responses, jumps, ratios, restitutions and of the states at
+     * stops by a parameter of gradients, at an event: du and shift as of `change`. NULL without
+     * gradients. */
+    void (*measure_along)(const void *values, double t, const double du[], const double shift[],
+                          int parameter, const struct contacts_measured *to);
+    /* Functions below; NULL without gradients. */
+    void (*strike_gradients)(const struct work *work, const double P[], const int is_struck[],
+                             const double restitution[]);
+    void (*hold_gradients)(const struct work *work);
     /* Writes the limits of all contacts, two of each, as `compare` of struct relations does. */
     void (*compare)(const void *values, double t, const struct given *given,
                     struct compared *compared);
@@ -99,6 +109,15 @@ struct contacts_room {
  * states or modes have changed. */
 enum status contacts_update(const struct call *call, const struct event *event, bool is_first,
                             bool is_start, bool *changes);
+
+/* Changes the gradients by impulses P of an impact, one per direction in its sense, before these
+ * change the states. */
+void contacts_strike_gradients(const struct work *work, const double P[], const int is_struck[],
+                               const double restitution[]);
+
+/* Lets gradients stay where contacts hold: no other parameter moves what is held, but with its
+ * stop. */
+void contacts_hold_gradients(const struct work *work);
 
 /* A linear complementarity problem with bounds: a = a0 + W T where each T is within its bounds and
  * a = 0, or T is low and a > 0, or T is high and a < 0. */

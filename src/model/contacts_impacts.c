@@ -26,6 +26,9 @@ static void push(struct work *work, int contact, double impulse) {
  * work->before. Velocities that become 0 do so to the last bit. */
 static void apply_impulses(struct work *work, const double P[], const int is_struck[],
                            const double restitution[]) {
+    if (work->model->strike_gradients != NULL) {
+        work->model->strike_gradients(work, P, is_struck, restitution);
+    }
     for (int k = 0; k < work->model->direction_count; k++) {
         if (!is_struck[k] || P[k] == 0.0) {
             continue;
@@ -76,9 +79,8 @@ static bool hardly_leaves(const struct work *work, int k) {
     return into > 0.0 && ratio * velocity * velocity <= most;
 }
 
-/* Solves for impulses that change velocities by as much as wanted, of members of all blocks. */
-static void solve_impulses(const struct work *work, const int is_member[], const double change[],
-                           double P[]) {
+void contacts_solve_impulses(const struct work *work, const int is_member[], const double change[],
+                             double P[]) {
     for (int block = 0; block < work->model->block_count; block++) {
         int member[CONTACTS_MOST_COUPLED] = {0};
         struct box box;
@@ -106,7 +108,7 @@ void contacts_rest_exactly(struct work *work) {
         work->acceleration[k] = -work->now.velocity[k];
     }
     if (!is_near) {
-        solve_impulses(work, work->rests, work->acceleration, work->hold);
+        contacts_solve_impulses(work, work->rests, work->acceleration, work->hold);
         for (int k = 0; k < count; k++) {
             const int friction = work->friction[k];
             if (work->rests[k] && friction >= 0) {
@@ -160,7 +162,7 @@ static void catch_on_stops(struct work *work) {
         work->before[k] = work->now.velocity[k];
         P[k] = 0.0;
     }
-    solve_impulses(work, caught, change, P);
+    contacts_solve_impulses(work, caught, change, P);
     double *plastic = work->acceleration;
     memset(plastic, 0, (size_t)count * sizeof *plastic);
     apply_impulses(work, P, caught, plastic);

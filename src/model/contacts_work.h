@@ -90,6 +90,13 @@ int contacts_members(const struct work *work, int block, const int is_member[], 
 void contacts_write_box(const struct work *work, const int member[], int count, const double a0[],
                         struct box *box);
 
+/* Returns where a room has what is measured. */
+struct contacts_measured contacts_measured_in(const struct contacts *model, double *room);
+
+/* Solves for impulses that change velocities by as much as wanted, of members of all blocks. */
+void contacts_solve_impulses(const struct work *work, const int is_member[], const double change[],
+                             double P[]);
+
 /* Refuses values that are impossible, with the reason. is_start: a position, too. */
 enum status contacts_check(const struct work *work, bool is_start);
 

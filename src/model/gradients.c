@@ -79,7 +79,7 @@ static void look_at_turn(const struct call *call, int relation) {
     const struct crossing found = crossing_of(call, relation);
     const struct compared *compared = &call->room.compared[relation];
     if (compared->used && is_within_reach(call, &found, fabs(compared->distance))) {
-        call->room.gradients.departure->doubtful = call->model->gradients->names[relation];
+        call->room.gradients.departure->missed = call->model->gradients->names[relation];
     }
 }
 
@@ -164,10 +164,11 @@ void gradients_depart(const struct call *call, const struct event *event) {
 static void note_doubt(const struct call *call, const struct event *event) {
     const struct departure *departure = call->room.gradients.departure;
     int *are_exact = exactness_of(call);
-    if (*are_exact && event->note != NULL && departure->doubtful != NULL) {
+    const char *touched = departure->missed != NULL ? departure->missed : departure->doubtful;
+    if (*are_exact && event->note != NULL && touched != NULL) {
         (void)snprintf(event->note, event->note_size,
                        "%.100s: it is only touched, and another parameter may let it happen or not",
-                       departure->doubtful);
+                       touched);
     } else if (*are_exact && event->note != NULL) {
         (void)snprintf(event->note, event->note_size,
                        "%.100s and %.100s come at once, and another parameter changes their order",
@@ -193,9 +194,8 @@ void gradients_arrive(const struct call *call, const struct event *event) {
         const double size = fabs(before[i]) + fabs(after[i]);
         jumps |= fabs(after[i] - before[i]) > no_jump * size;
     }
-    const bool is_near_miss = departure->doubtful != NULL && departure->cause == NULL;
     const bool is_doubtful = departure->doubtful != NULL || departure->other != NULL;
-    if (is_near_miss || (jumps && is_doubtful)) {
+    if (departure->missed != NULL || (jumps && is_doubtful)) {
         note_doubt(call, event);
     }
 }

@@ -54,22 +54,24 @@ struct departure {
     bool jumps;           /* true if the event has assigned something */
     const char *cause;    /* the first one; NULL: none yet */
     const char *other;    /* one at the same instant whose time changes in another way */
-    const char *doubtful; /* one that another parameter would let vanish or appear */
+    const char *doubtful; /* one that another parameter would let vanish */
+    const char *missed;   /* one that another parameter would let happen */
 };
 
 /* Memory for one call. */
 struct gradients_room {
-    double *shift; /* T_p of each parameter, s by its unit */
-    double *noise; /* of each shift */
-    double *rate;  /* two per state */
-    double *by;    /* two per parameter */
+    double *shift;    /* T_p of each parameter, s by its unit */
+    double *noise;    /* of each shift */
+    double *rate;     /* two per state */
+    double *by;       /* two per parameter */
+    double *contacts; /* what is measured of them, and two per direction */
     struct departure *departure;
 };
 
-#define GRADIENTS_ROOM(parameters, states)                                                         \
+#define GRADIENTS_ROOM(parameters, states, of_contacts)                                            \
     (struct gradients_room) {                                                                      \
         (double[parameters]){0}, (double[parameters]){0}, (double[2 * (states) + 1]){0},           \
-            (double[2 * (parameters)]){0}, &(struct departure) {                                   \
+            (double[2 * (parameters)]){0}, (double[(of_contacts) + 1]){0}, &(struct departure) {   \
             0                                                                                      \
         }                                                                                          \
     }

@@ -47,9 +47,12 @@ def runtime(level: str) -> building.Runtime:
     return replace(made, content=made.content | {"options": options})
 
 
-def quick(path: Path, output: Path, level: str = "-O1") -> Path:
-    """The FMU of FMI 2.0, and in fmi3 the one of 3.0: only what a run needs, with the same bits."""
-    file = read(path)
+def quick(path: Path, output: Path, level: str = "-O1", by: list[str] | None = None) -> Path:
+    """The FMU of FMI 2.0, and in fmi3 the one of 3.0: only what a run needs, with the same bits.
+
+    by: what there are gradients by, in place of what the file says.
+    """
+    file = read(path, by)
     references = lock.references(lock.path_of(path), declaration.keys(file))
     made, versions = runtime(level), {"fmi2": output, "fmi3": output / "fmi3"}
     describe = {"fmi2": building.fmi2_description, "fmi3": fmi3_description}

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from ..expressions.expression import in_order
 from . import algebraic
 from .graph import NOTED, STILL, Graph, Value, is_number, is_runtime, is_steep
+from .plain import plain
 
 Rates = Callable[[Value], tuple[Value, Value] | None]  # of a leaf; None: it rests
 LINEAR = ("+", "-", "negative", "moving_as", "element", "if", "component", "factors")
@@ -95,6 +96,8 @@ class Curve:
         match y.op:
             case op if op in LINEAR:
                 return graph.chain(y, dd)
+            case op if op.startswith("slopes_"):  # of gradients
+                return self.second(plain(graph, [y]))[0]
             case op if op in algebraic.VECTORS:
                 return algebraic.second(graph, y, self._first_at_rest, d, dd)
             case "*":

@@ -32,6 +32,7 @@ from .content import (
 
 ARE_EXACT = "gradients_are_exact"
 START = re.compile(r"start\(\s*(.+?)\s*\)")
+OF_IMPACTS = ("impulse", "impulses", "loss")  # of stops
 STEPS = {"floor", "ceil", "round", "sign"}
 SHIFT = "shift"  # leaf: derivative of the time of an event
 
@@ -91,8 +92,6 @@ def read(file: ModelFile, given: dict[str, Any], by: list[str] | None) -> None:
         entries = keys.entries(given | ({"by": by} if by else {}), keys.GRADIENTS, "by")
         if file.hook or file.is_by_hand:
             raise ModelFileError("expected a model whose events are no C by hand")
-        if any(not contact.is_friction for contact in file.contacts):
-            raise ModelFileError("gradients through [stops] are not known")
         found: dict[str, By] = {}
         for text in entries["by"]:
             with placed("by", shown(text)):
@@ -150,7 +149,8 @@ def warnings(file: ModelFile) -> Iterator[str]:
 def add(file: ModelFile) -> None:
     """Add the variables to a file whose expressions have their values."""
     gradients, graph = file.gradients, file.graph
-    moved = [v for v in file.of("states", "discrete") if v.is_real]
+    of_stops = {c.variable(key) for c in file.contacts for key in OF_IMPACTS}
+    moved = [v for v in file.of("states", "discrete") if v.name not in of_stops]
     for variable in moved:
         places = gradients.states if variable.section == "states" else gradients.discrete
         places[variable.leaf] = []

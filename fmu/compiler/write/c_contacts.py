@@ -147,11 +147,16 @@ def compare(
 
 
 def parts(
-    file: ModelFile, leaves: Leaves, counted: Sequence[str], compared: list[str]
+    file: ModelFile,
+    leaves: Leaves,
+    counted: Sequence[str],
+    compared: list[str],
+    along: Mapping[str, list[str]],
 ) -> dict[str, object]:
     """Return what events.c.in has of contacts.
 
-    counted: names of struct count. compared: lines that compare limits.
+    counted: names of struct count. compared: lines that compare limits. along: how gradients see
+    an impact.
     """
     found = file.graph.contacts
     if found is None:
@@ -165,6 +170,7 @@ def parts(
         moved=", ".join(str(states[x]) for x in found.moved) or "0",
         measure=_measure(file, leaves),
         compare=compared,
+        **along,
         contacts=counts[1],
         directions=counts[0],
         blocks=len(found.blocks),
@@ -237,7 +243,7 @@ def _measure(file: ModelFile, leaves: Leaves) -> list[str]:
         values |= {Place("to->jump[", m * count + e, "]"): slope for e, slope in enumerate(row)}
     for e, contact in enumerate(found.contacts):
         values |= {
-            Place(f"to->{key}[", e, "]"): value for key, value in _of_contact(file, contact).items()
+            Place(f"to->{key}[", e, "]"): value for key, value in of_contact(file, contact).items()
         }
     code.assign(values)
     for k, direction in enumerate(found.directions):
@@ -258,7 +264,7 @@ def _measure(file: ModelFile, leaves: Leaves) -> list[str]:
     return code.lines()
 
 
-def _of_contact(file: ModelFile, contact: Contact) -> dict[str, Value]:
+def of_contact(file: ModelFile, contact: Contact) -> dict[str, Value]:
     """Return what is measured of a contact."""
     given, graph = contact.given, file.graph
     if contact.is_friction:

@@ -9,7 +9,7 @@ from ..graph.graph import Value
 from ..read.content import ModelFile
 from ..read.gradients import ARE_EXACT
 from . import c_contacts
-from .c_code import Code
+from .c_code import Code, Leaves
 from .c_text import filled, indented, text
 from .statements import Operand, Place, store
 
@@ -45,10 +45,19 @@ def parts(events: Events) -> dict[str, object]:
         states=len(states),
         are_exact=file.fields.count(ARE_EXACT),
     )  # fmt: skip
+    contacts = file.graph.contacts
+    counts = (
+        [len(of) for of in (contacts.directions, contacts.contacts, contacts.moved)]
+        if contacts
+        else []
+    )
+    of_contacts = "0"
+    if contacts:
+        of_contacts = f"CONTACTS_MEASURED({', '.join(map(str, counts))}) + {2 * counts[0]}"
     return {
         "gradients": found.splitlines(),
         "of_gradients": [".gradients = &gradients,"],
-        "room_of_gradients": f", GRADIENTS_ROOM({len(by)}, {len(states)})",
+        "room_of_gradients": f", GRADIENTS_ROOM({len(by)}, {len(states)}, {of_contacts})",
     }
 
 
@@ -59,6 +68,41 @@ def shifts(file: ModelFile) -> dict[tuple[str, str], Operand]:
     }
     by = file.gradients.by if file.gradients else ()
     return moving | {("shift", given.name): Place("shift[", j, "]") for j, given in enumerate(by)}
+
+
+def along(file: ModelFile, leaves: Leaves) -> dict[str, list[str]]:
+    """Return how gradients see what is measured at an impact."""
+    found, gradients, graph = file.graph.contacts, file.gradients, file.graph
+    if gradients is None or found is None:
+        return {"measure_along": [], "of_gradients": []}
+    count = len(found.contacts)
+    values = {Place("to->velocity[", k, "]"): d.velocity for k, d in enumerate(found.directions)}
+    for key, rows in (("response", found.response), ("jump", found.moved.values())):
+        for i, row in enumerate(rows):
+            of = {Place(f"to->{key}[", i * count + e, "]"): v for e, v in enumerate(row)}
+            values |= of
+    for e, contact in enumerate(found.contacts):
+        own = c_contacts.of_contact(file, contact)
+        keys = [key for key in ("ratio", "restitution", "at_lower", "at_upper") if key in own]
+        values |= {Place(f"to->{key}[", e, "]"): own[key] for key in keys}
+    lines, inputs = [], [u.leaf for u in file.of("inputs")]
+    for j in range(len(gradients.by)):
+        slopes = graph.derivatives(values.values(), gradients.seeds(graph, j, inputs))
+        code = Code(leaves.but(shifts(file)))
+        code.assign(dict(zip(values, slopes, strict=True)))
+        lines += [f"if (parameter == {j}) {{", *indented(code.lines()), "}"]
+    head = [
+        "static void measure_along(const void *values_pointer, double time, const double du[],",
+        "                          const double shift[], int parameter,",
+        "                          const struct contacts_measured *to) {",
+        "    const struct equations_values *values = values_pointer;",
+        "    (void)values;",
+        "    (void)du;",
+        "    (void)shift;",
+    ]
+    members = [".measure_along = measure_along,"]
+    members += [f".{name}_gradients = contacts_{name}_gradients," for name in ("strike", "hold")]
+    return {"measure_along": [*head, *indented(lines), "}", ""], "of_gradients": members}
 
 
 def _rates(events: Events) -> list[str]:

@@ -24,6 +24,7 @@ from ..graph.graph import (
     Value,
     unsigned,
 )
+from ..graph.plain import plain
 from ..graph.stribeck import REACHED
 from ..plain_c.values import Conditions
 from .blocks import Blocks
@@ -61,7 +62,7 @@ class Series:
     ) -> None:
         self.graph, self.leaves = graph, leaves
         self.is_limited = is_limited  # elsewhere, to how far it holds
-        roots = [*rates.values(), *followed]
+        roots = plain(graph, [*rates.values(), *followed])
         self.is_wide = is_wide(roots, leaves.conditions)
         roots = scaled(graph, roots, self.is_wide)
         roots, plan, used = self._in_branches(roots)

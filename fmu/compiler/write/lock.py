@@ -17,7 +17,11 @@ Key = tuple[str, str]  # name and kind of a variable
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 99_999
 # longer than in a file: der_ and others stand in front
-ELEMENT = re.compile(r"[A-Za-z]\w*(\.\w+)*(\[[0-9]+(,[0-9]+)*\])?", re.ASCII)
+INDEXES = r"(\[[0-9]+(,[0-9]+)*\])"
+# of gradients, x[2]_by_left.k[3], too
+ELEMENT = re.compile(
+    rf"[A-Za-z]\w*(\.\w+)*({INDEXES}|{INDEXES}?(_by_\w+(\.\w+)*{INDEXES}?)+)?", re.ASCII
+)
 BARE = re.compile(r"\w+", re.ASCII)  # names that stand without quotes
 HEAD = "# Value references of {name}: written by the build. Keep it with the model.\n"
 

@@ -1,7 +1,9 @@
-"""RPPlant as a file with friction and stops as elements (../as_file): the motion of RPPlant.fmu."""
+"""RPPlant with friction and stops as elements (models/rp_plant/with_elements).
+
+It has the motion of RPPlant.fmu.
+"""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ BUILD = ROOT / "build"
 def plants(tmp_path_factory: pytest.TempPathFactory) -> tuple[Fmu, Fmu]:
     """The FMU in C, and that of the file."""
     folder = tmp_path_factory.mktemp("as_file")
-    file = Path(__file__).parents[1] / "as_file" / "rp_plant.toml"
+    file = ROOT / "models/rp_plant/with_elements/rp_plant.toml"
     return Fmu(BUILD / "RPPlant.fmu"), Fmu(quick(file, folder))
 
 

@@ -2,8 +2,8 @@
  * those of models/rp_plant; accelerations are affine in the forces of friction and stops. */
 #pragma once
 
-#include "../../../models/rp_manipulator/rp_payload.h"
-#include "../../../models/rp_manipulator/rp_recursion.h"
+#include "../../rp_manipulator/rp_payload.h"
+#include "../../rp_manipulator/rp_recursion.h"
 #include "rp_plant_values.h"
 
 /* The plant in a state, with what many equations share. */
