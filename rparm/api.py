@@ -22,6 +22,7 @@ from rparm.federation import federation, network
 from rparm.files import written
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
+from rparm.gradients import Gradient as Gradient
 from rparm.gradients import gradient as gradient
 from rparm.proof import errors as proof
 from rparm.proof.enclosure import prover_of

@@ -76,8 +76,7 @@ def gradient(
     """
     path = Path(model)
     if not path.suffix and not is_file(path):
-        folder = project.model(str(model))
-        path = folder / f"{folder.name}.toml"
+        path = project.equations_of_model(project.model(str(model))) or path
     fmu = _kept(path, tuple(by))
     wanted = [*of, *(gradient_name(name, each) for name in of for each in by)]
     check(fmu, of, by)
