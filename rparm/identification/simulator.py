@@ -28,7 +28,7 @@ FEWEST = 12  # rows of it
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.5)  # towards the middle of all states, if a start fails
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Wiring:
     """An FMU, and what its runs take and give."""
 
