@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rparm.api import (
+        Gradient,
         Scenario,
         System,
         Table,
         build,
         fmu,
+        gradient,
         identify,
         linearize,
         run_campaign,
@@ -20,8 +22,8 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "Scenario", "System", "Table", "build", "fmu", "identify", "linearize", "run_campaign",
-    "simulate",
+    "Gradient", "Scenario", "System", "Table", "build", "fmu", "gradient", "identify",
+    "linearize", "run_campaign", "simulate",
 ]  # fmt: skip
 
 

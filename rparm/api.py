@@ -22,6 +22,8 @@ from rparm.federation import federation, network
 from rparm.files import written
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
+from rparm.gradients import Gradient as Gradient
+from rparm.gradients import gradient as gradient
 from rparm.proof import errors as proof
 from rparm.proof.enclosure import prover_of
 from rparm.runs import scenario as scenarios
@@ -195,30 +197,16 @@ def simulate(
         Row i is what is read right after the step to time i; row 0 at the start.
     """
     path = Path(fmu)
-    if not (simulation.is_finite_number(tolerance) and 0 < tolerance < 1):
-        raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
     with Fmu(path) as opened:
         model = opened.model
-        with placed(path):
-            times = simulation.times_of(model.experiment, start_time, stop_time, step)
         names = list(model.real_outputs if outputs is None else outputs)
         for name in names:
             if name not in model.real_outputs:
                 raise UserError(
                     f"{path}: has no Real output {name!r}{hint(name, model.real_outputs)}"
                 )
-        values = simulation.start_values(model, start_values or {})
-        signals = {
-            name: simulation.input_values(model, name, x, times)
-            for name, x in (inputs or {}).items()
-        }
-        run = scenarios.Scenario(
-            name=path.stem, model=model.name, path=path, title=path.stem, description="",
-            parameters=values, initial={}, start=times[0], stop=times[-1], steps=(step,),
-            tolerance=tolerance, times=times, elapsed=times - times[0], signals={}, inputs=signals,
-            reference_every=1, defaults=model.start_values,
-        )  # fmt: skip
-        result = simulation.simulate(opened, run, compiled=True)
+        times = start_time, stop_time, step
+        result = simulation.of_program(opened, times, start_values, inputs, tolerance)
         columns = [result.names.index(name) for name in names]
         return Table(result.times, names, result.values[:, columns], _units(model))
 

@@ -147,23 +147,28 @@ def compilers(first: str) -> Iterator[object]:
         yield subprocess.run([name, "--version"], capture_output=True, check=False).stdout
 
 
-def _texts(file: Path) -> Iterator[object]:
-    """Yield a file with equations and all files that it leads to, each with its name."""
+def files_of(file: Path) -> Iterator[tuple[Path, bytes, list[str]]]:
+    """Yield a file with equations and all that it leads to: path, content, and names in it."""
     todo, found = [file], {file.resolve()}
     while todo:
         path = todo.pop()
-        if path != file:
-            yield os.path.relpath(path, file.parent)
-        if not path.is_file():
-            continue
-        content = path.read_bytes() if path.stat().st_size <= LARGEST_NAMED else b""
-        yield content
-        for name in _named(path, content):
-            if path == file and name.endswith((".c", ".h")):  # names in C begin as the file's
-                yield file.stem
-            if (path.parent / name).resolve() not in found:
-                found.add((path.parent / name).resolve())
-                todo.append(path.parent / name)
+        is_there = path.is_file() and path.stat().st_size <= LARGEST_NAMED
+        content = path.read_bytes() if is_there else b""
+        names = [*_named(path, content)]
+        yield path, content, names
+        for other in (path.parent / name for name in names):
+            if other.resolve() not in found:
+                found.add(other.resolve())
+                todo.append(other)
+
+
+def _texts(file: Path) -> Iterator[object]:
+    """Yield a file with equations and all files that it leads to, each with its name."""
+    for path, content, names in files_of(file):
+        yield os.path.relpath(path, file.parent) if path != file else ""
+        yield content if path.is_file() else None
+        if path == file and any(name.endswith((".c", ".h")) for name in names):
+            yield file.stem  # names in C begin as the file's
 
 
 def _named(path: Path, content: bytes) -> Iterator[str]:

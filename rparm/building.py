@@ -103,13 +103,16 @@ def is_equations(file: Path) -> bool:
 
 
 @contextmanager
-def archive(file: Path, version: str = project.VERSIONS[0]) -> Iterator[Path]:
+def archive(
+    file: Path, version: str = project.VERSIONS[0], gradients: Sequence[str] = ()
+) -> Iterator[Path]:
     """Yield the FMU of a file with equations, in a temporary folder; another file as it is."""
     if Path(file).suffix.lower() != EQUATIONS:
         yield Path(file)
         return
     with temporary_folder() as folder:
-        yield build(file, output=folder, lock=False)[project.VERSIONS.index(version)]
+        fmus = build(file, output=folder, lock=False, gradients=gradients)
+        yield fmus[project.VERSIONS.index(version)]
 
 
 def _lock(file: Path) -> Path:

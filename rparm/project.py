@@ -4,6 +4,7 @@ models/MODEL/scenarios/NAME.toml        a scenario
 models/MODEL/convergence/NAME.toml      a problem for the order of convergence, of that format
 models/MODEL/references/NAME/           MODEL_ref.csv of a scenario, exact.json of a problem
 models/MODEL/references/scales.toml     sums that errors are divided by, instead of maxima
+models/MODEL/MODEL.toml                 its equations; with_elements/: without events in C
 models/SYSTEM/loop.toml                 connects models to a system
 models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
@@ -50,6 +51,7 @@ START = "start.toml"
 STUDY = "study"  # the module of a system's folder that rparm.systems.comparison describes
 IDENTIFICATION = "identification"  # module of a system's folder, read by identification.request
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
+ELEMENTS = "with_elements"  # in the folder of a model, the same one with elements for its events
 PROVEN = "references/proven.toml"  # in the folder of a model whose references and runs are proven
 WEB = "wasm32-wasi"  # platform of FMUs for browsers
 SCENARIO_FOLDERS = ("scenarios", "convergence")
@@ -291,6 +293,24 @@ def is_built(path: Path, folder: Path) -> bool:
     """Return whether a file of this build is built from the folder of a model or system."""
     is_here = path.resolve().parent in [ROOT.resolve() / name for name in BUILD_FOLDERS.values()]
     return is_here and is_built_from(path.stem, folder)
+
+
+def equations(fmu: Path) -> Path | None:
+    """Return the file with the equations of an FMU of the project, or such a file; or None."""
+    if fmu.suffix.lower() == ".toml":
+        return fmu
+    is_shipped = INSTALLED and fmu.resolve().is_relative_to(cache_folder("files").resolve())
+    for folder in models().values():
+        if is_built_from(fmu.stem, folder) if is_shipped else is_built(fmu, folder):
+            return equations_of_model(folder)
+    return None
+
+
+def equations_of_model(folder: Path) -> Path | None:
+    """Return the file with the equations of a model: that without events in C, if there is one."""
+    name = f"{folder.name}.toml"
+    files = folder / ELEMENTS / name, folder / name
+    return next((file for file in files if file.is_file()), None)
 
 
 def fmu_of(subject: Path, option: str = "", version: str = VERSIONS[0]) -> Path:

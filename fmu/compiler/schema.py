@@ -142,6 +142,7 @@ def _further(named: Schema) -> dict[str, Schema]:
         "events": _by_name(_change(reader.EVENT), named),
         "friction": _by_name(_friction(), {}),
         "stops": _by_name(_stops(), {}),
+        "gradients": _gradients(),
         "check": {"type": "object"} | check,
         "terminals": TERMINALS,
         "hook": _hook(),
@@ -160,6 +161,11 @@ def _friction() -> Schema:
 def _stops() -> Schema:
     found = _keys(reader.STOPS, *contacts.NEEDED[contacts.STOPS])
     return found | {"anyOf": [{"required": ["lower"]}, {"required": ["upper"]}]}
+
+
+def _gradients() -> Schema:
+    names = {"type": "array", "items": TEXT | {"minLength": 1}, "minItems": 1}
+    return _table(dict.fromkeys(reader.GRADIENTS, names), reader.GRADIENTS[0])
 
 
 def _components() -> Schema:

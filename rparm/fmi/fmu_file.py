@@ -196,9 +196,9 @@ def _shown(name: str) -> str:
 class Fmu(AbstractContextManager["Fmu"]):
     """FMU unpacked in the folder `within`, a temporary one by default; removed at the end.
 
-    Of a file with equations it is built, for a `version` of FMI. Raises UserError if the file is
-    no FMU of the `kind`, co-simulation or model exchange, of a known version of FMI, that runs on
-    this platform. Messages name it `shown`, if in an archive.
+    Of a file with equations it is built, for a `version` of FMI, with `gradients`. Raises
+    UserError if the file is no FMU of the `kind`, co-simulation or model exchange, of a known
+    version of FMI, that runs on this platform. Messages name it `shown`, if in an archive.
     """
 
     def __init__(
@@ -208,9 +208,10 @@ class Fmu(AbstractContextManager["Fmu"]):
         shown: Path | None = None,
         kind: str = CO_SIMULATION,
         version: str = VERSIONS[0],
+        gradients: Sequence[str] = (),
     ) -> None:
         self.path, self.kind = Path(shown or path), kind  # the path for messages
-        with building.archive(path, version) as archive:
+        with building.archive(path, version, gradients) as archive:
             self._unpack(archive, within)
 
     def _unpack(self, archive: Path, within: Path | None) -> None:

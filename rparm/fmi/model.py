@@ -1,6 +1,7 @@
 """A model as its FMU describes it: which variables there are, and which values they take."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -34,6 +35,9 @@ KINDS = {PARAMETERS: "a parameter", INITIAL: "a state", INPUTS: "an input"}
 
 # parameters of FMUs that bring their own integrator, as this project's do
 METHOD, TOLERANCE = "solver_method", "relative_tolerance"
+# of FMUs with gradients, which fmu/compiler/read/gradients.py names
+ARE_EXACT = "gradients_are_exact"
+START = re.compile(r"start\(\s*(.+?)\s*\)")
 # smallest relative tolerance of each method: below it, FMUs integrate as at this one
 SMALLEST_TOLERANCES = {"cvode_adams": 5e-12, "cvode_bdf": 5e-12, "erk": 1e-12, "taylor": 1e-13}
 
@@ -160,6 +164,16 @@ class Model:
         return [variable.name for variable in found if variable.type == "Real"]
 
     @property
+    def own_states(self) -> list[str]:
+        """Names of the states that are no gradients of others."""
+        if ARE_EXACT not in self.variables:
+            return list(self.states)
+        by = [name for name, v in self.variables.items() if v.is_a(PARAMETERS)]
+        by += [f"start({name})" for name in self.states]
+        gradients = {gradient_name(name, each) for name in self.states for each in by}
+        return [name for name in self.states if name not in gradients]
+
+    @property
     def start_values(self) -> dict[str, Value]:
         return {v.name: v.start for v in self.variables.values() if v.start is not None}
 
@@ -193,6 +207,12 @@ class Model:
             raise WrongValueError(f"the model has no variable {name!r}{hint(name, meant)}")
         known = ", ".join(meant) or "none"
         raise WrongValueError(f"{name!r} is not {KINDS[kind]} of the model (known: {known})")
+
+
+def gradient_name(of: str, by: str) -> str:
+    """Name the derivative of a variable by a parameter, or by "start(NAME)" of a state."""
+    start = START.fullmatch(by)
+    return f"{of}_by_{f'start_{start[1]}' if start else by}"
 
 
 def described(description: ModelDescription) -> Model:

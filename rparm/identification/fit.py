@@ -148,7 +148,10 @@ class Problem:
         return float(digits * np.sqrt(rows) / CENTRAL_STEP)
 
     def linear(self, z: np.ndarray, x: np.ndarray, is_exact: bool = False) -> list[Linear]:
-        """Return segments, linear at a point; `is_exact` takes central differences: more runs."""
+        """Return segments, linear at a point.
+
+        `is_exact` takes central differences, which need more runs, where there are no gradients.
+        """
 
         def of(i: int) -> Linear:
             return self._linear(self.segments[i], z, x[i], is_exact)
@@ -156,6 +159,40 @@ class Problem:
         return self.simulator.map(of, range(len(self.segments)))
 
     def _linear(self, segment: Segment, z: np.ndarray, x: np.ndarray, is_exact: bool) -> Linear:
+        found = self._by_gradients(segment, z, x)
+        base, table = self._by_differences(segment, z, x, is_exact) if found is None else found
+        return Linear(segment, base, table[:, : len(x)], table[:, len(x) :])
+
+    def _by_gradients(
+        self, segment: Segment, z: np.ndarray, x: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return residuals and derivatives (rows, states + parameters) of one run, if it has them.
+
+        There are none where an event leaves the run without exact gradients.
+        """
+        values, delay = self.values(z)
+        seen = self.simulator.run_with_gradients(segment, np.append(values, x * self.scales))
+        if seen is None:
+            return None
+        if delay or DELAY in self.parameters.names:
+            curve = CubicSpline(segment.times, seen, axis=0)
+            seen, rates = curve(segment.times - delay), curve(segment.times - delay, 1)
+        outputs, by_values, by_starts = np.split(seen, [1, 1 + len(values)], axis=2)
+        if DELAY in self.parameters.names:
+            index = self.parameters.names.index(DELAY)
+            by_values = np.insert(by_values, index, -rates[..., 0], axis=2)
+        by = np.dstack([by_starts * self.scales, by_values @ self.parameters.slopes(z)])
+        base = ((outputs[..., 0] - segment.measured) / self.noise)[segment.counts]
+        table = (by / self.noise[:, None])[segment.counts]
+        if self.near is not None:
+            base = np.append(base, (z - self.near) / SPREAD)
+            table = np.vstack([table, np.eye(len(z), table.shape[1], len(x)) / SPREAD])
+        return base, table
+
+    def _by_differences(
+        self, segment: Segment, z: np.ndarray, x: np.ndarray, is_exact: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return residuals and difference quotients (rows, states + parameters)."""
         base = self._with_near(segment, z, x)
         size = CENTRAL_STEP if is_exact else STEP
         table = np.empty((len(base), len(x) + len(z)))
@@ -174,7 +211,7 @@ class Problem:
             if not found:
                 raise UserError(f"{self.simulator.fmu.path}: runs on neither side of the solution")
             table[:, k] = np.mean(found, axis=0)
-        return Linear(segment, base, table[:, : len(x)], table[:, len(x) :])
+        return base, table
 
 
 def _shortened(new: np.ndarray, old: np.ndarray) -> Iterator[np.ndarray]:

@@ -1,13 +1,14 @@
 """Identification in one call, from the request to the results, and validation by another log."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from rparm import gradients
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
@@ -40,6 +41,7 @@ ROUNDING = 1e-5  # of the range of an output: differences of two exact runs of a
 AWAY = 0.1  # of the range of the measured values: an error that is no longer followed
 LEAD = 0.1  # of a segment: the longest delay
 WIDEST = np.log(1e6)  # of a distance from a limit: beyond, one end of an interval is not known
+MOST_RESTARTS = 5  # of a fit
 FEWEST_SEGMENTS = 5  # for intervals by scatter
 SUSPICIOUS, BAD = 2.0, 10.0  # values of chi2
 CAUSES = "usual causes are units, outliers, or a model that lacks something"
@@ -239,9 +241,21 @@ def _read(request: Request, known: Checked, path: Path) -> Recording:
 
 def identify(fmu: Fmu, request: Request) -> Identification:
     """Fit parameters of an FMU to logs; UserError if the request, a log or a run is wrong."""
+    with ExitStack() as stack:
+        return _identified(fmu, request, stack)
+
+
+def _identified(fmu: Fmu, request: Request, stack: ExitStack) -> Identification:
     known = checked(request, fmu)
     recordings = [_read(request, known, path) for path in request.logs]
     noise, notes = logs.noise(recordings), []
+    with_gradients = None
+    try:
+        by = [*known.names, *map("start({})".format, state_names(fmu))]
+        with_gradients = gradients.opened(fmu, [*known.outputs], by, stack)
+    except UserError as error:
+        notes.append(f"Derivatives are difference quotients: {error}.")
+    known = replace(known, with_gradients=with_gradients)
     fitted = _fitted(fmu, request, known, recordings, noise)
     if any(recording.filled for recording in recordings):
         filled = [recording.filled or recording for recording in recordings]
@@ -323,7 +337,7 @@ def _fitted(
         }
         is_one_run = _remembers(fmu, request, known, problem, runs, z, x[firsts])
         if not is_one_run:
-            found = fit.fit(problem, x, z)
+            found = _restarted(fmu, request, known, problem, fit.fit(problem, x, z), z)
             is_one_run = _remembers(fmu, request, known, problem, runs, found.z, found.x[firsts])
         if is_one_run:
             found = _of_runs(problem, replace(problem, segments=list(runs)), x, x[firsts], z)
@@ -340,6 +354,47 @@ def _fitted(
         recordings, problem.segments, of_first, is_one_run, found, states, predicted, pieces,
         rounding,
     )  # fmt: skip
+
+
+def _restarted(
+    fmu: Fmu,
+    request: Request,
+    known: Checked,
+    problem: Problem,
+    found: fit.Solution,
+    z: np.ndarray,
+) -> fit.Solution:
+    """Fit again from the parameters `z`, if segments are far off: these start as others end.
+
+    What was guessed for a start across an impact may lead a segment, and with it the parameters,
+    to another minimum.
+    """
+    states, segments = state_names(fmu), problem.segments
+    names = list(known.reals), list(known.switches), states
+    with Simulator(fmu, known.names, states, *names, known.settings, request.tolerance) as runs:
+
+        def start(i: int) -> np.ndarray:
+            before, segment = segments[i - 1 : i + 1] if i else (None, segments[0])
+            with suppress(UserError):
+                left = problem.residuals(segment, found.z, found.x[i])
+                longer = before and logs.continued(before, segment)
+                if longer and np.mean(left**2) > SUSPICIOUS:
+                    values = np.append(problem.values(found.z)[0], found.x[i - 1] * problem.scales)
+                    return runs.run(longer, values)[-1] / problem.scales
+            return found.x[i]
+
+        for _ in range(MOST_RESTARTS):
+            count = sum(int(segment.counts.sum()) for segment in segments)
+            if found.cost < SUSPICIOUS * count:
+                break
+            try:
+                other = fit.fit(problem, np.array(runs.map(start, range(len(segments)))), z)
+            except UserError:  # the FMU refuses such a start
+                break
+            if other.cost > found.cost - CLEAR:
+                break
+            found = other
+    return found
 
 
 def _of_runs(
@@ -407,7 +462,8 @@ def _problem(
     estimated = [name for name in parameters.names if name != DELAY]
     names = list(known.reals), list(known.switches), list(known.outputs)
     states = state_names(fmu)
-    with Simulator(fmu, estimated, states, *names, settings, request.tolerance) as simulator:
+    given = fmu, estimated, states, *names, settings, request.tolerance, known.with_gradients
+    with Simulator(*given) as simulator:
         guessed = guess_start(fmu, segments, names[2], known.starts)
         guessed = admitted_start(simulator, segments, parameters, guessed)
         scales = start_scales(guessed)

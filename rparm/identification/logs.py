@@ -199,6 +199,20 @@ def segment_of(recording: Recording, start: int, first: int, last: int) -> Segme
     )
 
 
+def continued(segment: Segment, following: Segment) -> Segment | None:
+    """Return a segment up to where the following one starts; None if there is a gap between."""
+    end = following.times[0]
+    rows = int(np.searchsorted(segment.times, end))
+    if not rows or end > segment.times[-1] + 2 * (segment.times[-1] - segment.times[-2]):
+        return None
+    names = "times", "inputs", "switches", "measured"
+    joint = [
+        np.concatenate([getattr(segment, name)[:rows], getattr(following, name)[:1]])
+        for name in names
+    ]
+    return Segment(*joint, 0)
+
+
 def joined(recording: Recording, pieces: Sequence[Segment]) -> Segment:
     """Return segments of a recording as pieces of one, which lasts to its end: inputs hold."""
     rows = [int(np.searchsorted(recording.times, piece.times[piece.first])) for piece in pieces]

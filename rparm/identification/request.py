@@ -154,6 +154,7 @@ class Checked:
     reals: Mapping[str, Column]  # of Real inputs
     switches: Mapping[str, Column]  # of Boolean inputs
     outputs: Mapping[str, Column]
+    with_gradients: Fmu | None = None  # of the same model, if there is one
 
     @property
     def names(self) -> list[str]:

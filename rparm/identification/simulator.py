@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from typing import TypeVar
 
 import fmpy
@@ -14,7 +15,7 @@ from rparm.errors import UserError
 from rparm.fmi.compiled_loop import Part, Stepper
 from rparm.fmi.fmi_instance import Instance, Reals
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INITIAL, Value
+from rparm.fmi.model import ARE_EXACT, INITIAL, Value, gradient_name
 from rparm.identification.logs import Segment
 from rparm.identification.request import Parameters
 
@@ -27,11 +28,37 @@ FEWEST = 12  # rows of it
 SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.5)  # towards the middle of all states, if a start fails
 
 
+@dataclass(frozen=True, eq=False)
+class _Wiring:
+    """An FMU, and what its runs take and give."""
+
+    fmu: Fmu
+    reals: Part
+    switches: Part
+
+    @staticmethod
+    def of(
+        fmu: Fmu, inputs: Sequence[str], switches: Sequence[str], outputs: Sequence[str]
+    ) -> "_Wiring":
+        variables = fmu.model.variables
+
+        def references(names: Sequence[str]) -> tuple[int, ...]:
+            return tuple(variables[name].reference for name in names)
+
+        flags = references([ARE_EXACT] if ARE_EXACT in variables else [])
+        return _Wiring(
+            fmu,
+            Part(references(inputs), tuple(range(len(inputs))), references(outputs)),
+            Part(references(switches), tuple(range(len(switches))), flags),
+        )
+
+
 class Simulator:
     """Instances of an FMU, one for each thread; a context manager that frees them.
 
     `parameters` and `states` differ between runs, `settings` do not; `inputs` are Reals, `switches`
-    Booleans; `outputs` are read. The `tolerance` is relative.
+    Booleans; `outputs` are read. The `tolerance` is relative. `with_gradients` is the same model
+    with gradients of the outputs by parameters and starts of states, if there is one.
     """
 
     def __init__(
@@ -44,17 +71,16 @@ class Simulator:
         outputs: Sequence[str],
         settings: Mapping[str, Value],
         tolerance: float,
+        with_gradients: Fmu | None = None,
     ) -> None:
         self.fmu, self.names = fmu, (*parameters, *states)
         self.settings, self.tolerance = settings, tolerance
-        variables = fmu.model.variables
-
-        def references(names: Sequence[str]) -> tuple[int, ...]:
-            return tuple(variables[name].reference for name in names)
-
-        sources = tuple(range(len(inputs)))
-        self.reals = Part(references(inputs), sources, references(outputs))
-        self.switches = Part(references(switches), tuple(range(len(switches))), ())
+        self._outputs = len(outputs)
+        self._wirings = [_Wiring.of(fmu, inputs, switches, outputs)]
+        if with_gradients is not None:
+            by = [*parameters, *map("start({})".format, states)]
+            slopes = [gradient_name(name, each) for name in outputs for each in by]
+            self._wirings.append(_Wiring.of(with_gradients, inputs, switches, [*outputs, *slopes]))
         self._own, self._runners = threading.local(), list[_Runner]()
         self._pool = ThreadPoolExecutor(CORES)
 
@@ -72,22 +98,44 @@ class Simulator:
 
     def run(self, segment: Segment, values: np.ndarray) -> np.ndarray:
         """Run with values of parameters and states; outputs (rows, outputs), or UserError."""
-        if not hasattr(self._own, "runner"):
-            self._own.runner = _Runner(self)
-            self._runners.append(self._own.runner)
-        return self._own.runner.run(segment, values)
+        return self._runner(self._wirings[0]).run(segment, values)
+
+    def run_with_gradients(self, segment: Segment, values: np.ndarray) -> np.ndarray | None:
+        """Run; outputs and their derivatives (rows, outputs, 1 + values), None if not exact."""
+        if len(self._wirings) < 2:
+            return None
+        runner = self._runner(self._wirings[1])
+        with suppress(UserError):
+            record = runner.run(segment, values)
+            if runner.are_exact:
+                outputs, slopes = np.split(record, [self._outputs], axis=1)
+                return np.dstack([outputs, slopes.reshape(*outputs.shape, len(values))])
+        return None
+
+    def _runner(self, wiring: _Wiring) -> "_Runner":
+        """Return this thread's instance of an FMU."""
+        found = vars(self._own).setdefault("runners", {})
+        if wiring not in found:
+            found[wiring] = _Runner(self, wiring)
+            self._runners.append(found[wiring])
+        return found[wiring]
 
 
 class _Runner:
     """One instance, whose runs begin with a reset."""
 
-    def __init__(self, simulator: Simulator) -> None:
-        self._simulator = simulator
-        reals, switches = simulator.reals, simulator.switches
+    def __init__(self, simulator: Simulator, wiring: _Wiring) -> None:
+        self._simulator, self._fmu = simulator, wiring.fmu
+        reals, switches = wiring.reals, wiring.switches
         self._stepper = Stepper([reals], [switches], len(reals.inputs), len(switches.inputs))
         self._watched = len(reals.inputs) + np.arange(len(reals.outputs))
         self._stack = ExitStack()
         self._instance: Instance | None = None
+
+    @property
+    def are_exact(self) -> bool:
+        """Whether gradients of the last run are exact, of an FMU that has some."""
+        return bool(self._stepper.switches.values[-1])
 
     def close(self) -> None:
         """Free the instance."""
@@ -108,7 +156,7 @@ class _Runner:
         if self._instance is not None:
             self._instance.reset()
             return self._instance, self._given
-        fmu = self._simulator.fmu
+        fmu = self._fmu
         with LOADING:
             instance = self._stack.enter_context(fmu.instance(fmu.model.name))
         self._instance = instance
@@ -127,7 +175,7 @@ class _Runner:
             given.set()
         instance.enter_initialization()
         self._stepper.reals.values[: segment.inputs.shape[1]] = segment.inputs[0]
-        self._stepper.switches.values[:] = segment.switches[0]
+        self._stepper.switches.values[: segment.switches.shape[1]] = segment.switches[0]
         self._stepper.set_inputs("in initialization")
         instance.exit_initialization()
         self._stepper.read_outputs(f"at the start, t = {float(segment.times[0])!r} s,")
@@ -146,10 +194,11 @@ class _Runner:
 # ---- Start states --------------------------------------------------------------------------------
 def state_names(fmu: Fmu) -> list[str]:
     """Return the names of the states; UserError if one cannot be set."""
-    for name in fmu.model.states:
+    names = fmu.model.own_states
+    for name in names:
         if not fmu.model.variables[name].is_a(INITIAL):
             raise UserError(f"{fmu.path}: state {name!r} cannot be set where a segment starts")
-    return list(fmu.model.states)
+    return names
 
 
 def start_rates(fmu: Fmu) -> dict[str, str]:

@@ -19,7 +19,7 @@ from rparm.errors import StoppedError, UserError, WrongValueError, placed
 from rparm.files import difference
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Experiment, Model, Value
+from rparm.fmi.model import ARE_EXACT, INITIAL, INPUTS, PARAMETERS, Experiment, Model, Value
 from rparm.runs.scenario import USUAL_STEPS, Scenario, count_steps
 
 PROGRESS_EVERY = 0.1  # s
@@ -47,6 +47,7 @@ class Result:
     solver_steps: int | None  # None: the FMU has no such variable
     solver_rhs_evaluations: int | None
     messages: tuple[str, ...]  # warnings from the FMU, the last ones
+    are_exact: bool | None = None  # gradients of the FMU, at the end; None: it has none
     integers: dict[str, np.ndarray] = field(default_factory=dict)  # (rows,): those to be drawn
 
 
@@ -87,11 +88,17 @@ def simulate(
             solver_steps=instance.integer("solver_steps") if ended else None,
             solver_rhs_evaluations=instance.integer("solver_rhs_evaluations") if ended else None,
             messages=tuple(instance.messages),
+            are_exact=_are_exact(instance) if ended else None,
             integers=dict(zip(drawn, integers.T, strict=True)),
         )
         if failure is not None:
             raise StoppedError(str(failure), result) from failure
         return result
+
+
+def _are_exact(instance: Instance) -> bool | None:
+    known = ARE_EXACT in instance.fmu.model.variables
+    return bool(instance.discrete(ARE_EXACT)) if known else None
 
 
 def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None:
@@ -292,6 +299,30 @@ def communication_points(start: float, stop: float, step: float) -> np.ndarray:
     times = start + step * np.arange(count_steps(start, stop, step) + 1)
     times[-1] = stop
     return times
+
+
+def of_program(
+    fmu: Fmu,
+    times: tuple[float | None, float | None, float | None],
+    given: Mapping[str, Value] | None,
+    inputs: Mapping[str, Input] | None,
+    tolerance: float,
+) -> Result:
+    """Run an FMU from start to stop time by a step, `times` (s), as `rparm.simulate` explains."""
+    path, model = fmu.path, fmu.model
+    if not (is_finite_number(tolerance) and 0 < tolerance < 1):
+        raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
+    with placed(path):
+        points = times_of(model.experiment, *times)
+    values = start_values(model, given or {})
+    signals = {name: input_values(model, name, x, points) for name, x in (inputs or {}).items()}
+    run = Scenario(
+        name=path.stem, model=model.name, path=path, title=path.stem, description="",
+        parameters=values, initial={}, start=points[0], stop=points[-1], steps=(times[2],),
+        tolerance=tolerance, times=points, elapsed=points - points[0], signals={}, inputs=signals,
+        reference_every=1, defaults=model.start_values,
+    )  # fmt: skip
+    return simulate(fmu, run, compiled=True)
 
 
 def start_values(model: Model, given: Mapping[str, Any]) -> dict[str, Value]:
