@@ -7,7 +7,8 @@ import os
 import random
 import tomllib
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +133,6 @@ def wrong(seed: int, folder: Path) -> list[str]:
 
 
 def test_gradients_of_random_plants(tmp_path: Path) -> None:
-    with ThreadPoolExecutor(2) as pool:
-        found = pool.map(lambda seed: wrong(seed, tmp_path), range(COUNT))
+    with ProcessPoolExecutor(2) as pool:
+        found = [*pool.map(partial(wrong, folder=tmp_path), range(COUNT))]
     assert not (texts := [text for each in found for text in each]), "\n".join(texts)

@@ -123,10 +123,11 @@ def _crossing(events: Events, index: int, distance: Value) -> list[str]:
     (slopes,) = graph.gradients([distance], [*motion, *gradients.discrete, *parameters])
     terms = [graph.simple("*", slope, motion[x]) for x, slope in slopes.items() if x in motion]
     slope, size = _sums(events, code, terms)
-    (whole,) = graph.derivatives([distance], motion)
-    (curvature,) = graph.derivatives([whole], motion)
     stores = [store("to->slope", slope), store("to->size", size)]
-    stores.append(store("to->curvature", code.of(curvature)))
+    if index < gradients.relations:  # forces that hold contacts have long derivatives
+        (whole,) = graph.derivatives([distance], motion)
+        (curvature,) = graph.derivatives([whole], motion)
+        stores.append(store("to->curvature", code.of(curvature)))
     if any(u.leaf in slopes for u in inputs):
         stores.append(store("to->is_of_input", "true"))
     for j in range(len(gradients.by)):
