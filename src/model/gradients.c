@@ -64,7 +64,8 @@ static void add_crossing(const struct call *call, const struct event *event, int
     const bool is_flat = !(fabs(found.slope) > flat * found.size);
     // how far from here the slope is 0, ahead or behind: a multiple root may be located beside it
     const double depth = 0.5 * found.slope * found.slope / fabs(found.curvature);
-    if (is_flat || is_within_reach(call, &found, depth)) {
+    const bool is_kink = relation < call->model->relation_count && gradients->is_kink[relation];
+    if (!is_kink && (is_flat || is_within_reach(call, &found, depth))) {
         departure->doubtful = gradients->names[relation];
     }
     if (found.is_of_input && !event->du_is_known) {
@@ -163,6 +164,30 @@ void gradients_depart(const struct call *call, const struct event *event) {
     move(call, room->rate, 1.0);
 }
 
+/* Looks at relations that begin at their limits, whose derivatives along with the event are not 0:
+ * with another parameter they begin on one side or on the other. */
+static void look_at_ties(const struct call *call) {
+    const struct gradients *gradients = call->model->gradients;
+    const struct gradients_room *room = &call->room.gradients;
+    modes_compare(call, call->room.tolerance, call->room.compared);
+    const int count = call->relation_count > 0 ? gradients->relation_count : 0;
+    for (int k = 0; k < count; k++) {
+        const struct compared *compared = &call->room.compared[k];
+        if (gradients->is_kink[k] || !compared->used || !modes_near(compared)) {
+            continue;
+        }
+        const struct crossing found = crossing_of(call, k);
+        for (int j = 0; j < gradients->count; j++) {
+            const double drift = found.drift * room->shift[j];
+            // of the gradients before they have moved with the event, too
+            const double size = found.sizes[j] + fabs(drift) + fabs(found.slope * room->shift[j]);
+            if (fabs(found.by[j] + drift) > same * size) {
+                room->departure->tied = gradients->names[k];
+            }
+        }
+    }
+}
+
 /* Writes once from when on the gradients are not exact, and why. */
 static void note_doubt(const struct call *call, const struct event *event) {
     const struct departure *departure = call->room.gradients.departure;
@@ -177,6 +202,11 @@ static void note_doubt(const struct call *call, const struct event *event) {
         (void)snprintf(event->note, event->note_size,
                        "%.100s: it is only touched, and another parameter may let it happen or not",
                        touched);
+    } else if (departure->tied != NULL) {
+        (void)snprintf(event->note, event->note_size,
+                       "%.100s begins exactly at its limit, and another parameter moves it to one "
+                       "side or the other",
+                       departure->tied);
     } else if (departure->other != NULL) {
         (void)snprintf(event->note, event->note_size,
                        "%.100s and %.100s come at once, and another parameter changes their order",
@@ -188,10 +218,16 @@ static void note_doubt(const struct call *call, const struct event *event) {
     }
 }
 
-void gradients_arrive(const struct call *call, const struct event *event) {
+void gradients_arrive(const struct call *call, const struct event *event, bool is_start) {
     const struct gradients *gradients = call->model->gradients;
     const struct gradients_room *room = &call->room.gradients;
     const struct departure *departure = room->departure;
+    if (is_start || departure->has_departed || departure->jumps) {
+        look_at_ties(call);
+    }
+    if (departure->tied != NULL && !departure->has_departed) {
+        note_doubt(call, event);
+    }
     if (!departure->has_departed) {
         return;
     }
@@ -207,7 +243,7 @@ void gradients_arrive(const struct call *call, const struct event *event) {
     }
     const bool is_doubtful =
         departure->doubtful != NULL || departure->other != NULL || departure->driven != NULL;
-    if (departure->missed != NULL || (jumps && is_doubtful)) {
+    if (departure->missed != NULL || departure->tied != NULL || (jumps && is_doubtful)) {
         note_doubt(call, event);
     }
 }

@@ -21,6 +21,7 @@ struct call;
 struct crossing {
     double slope;     /* derivative by the time, 1/s */
     double size;      /* sum of the magnitudes of its terms */
+    double drift;     /* the part of the slope that time and inputs make */
     double curvature; /* second derivative by the time, 1/s2 */
     bool is_of_input; /* true if inputs take part */
     double *by;       /* derivative by each parameter, at a fixed time */
@@ -34,6 +35,7 @@ struct gradients {
     const double *size;       /* of a change of each parameter that is not small */
     const char *const *names; /* of relations, then of the limits of contacts */
     int relation_count;       /* those of the model; behind them slopes are compared with 0 */
+    const bool *is_kink;      /* of each relation: both sides are equal where it switches */
     const int *watched; /* of each relation: the one whose slope it compares with 0; -1: none */
 
     /* Writes the rates of the states. */
@@ -46,7 +48,7 @@ struct gradients {
 
     /* The functions below. FMUs whose model does not name them are linked without them. */
     void (*depart)(const struct call *call, const struct event *event);
-    void (*arrive)(const struct call *call, const struct event *event);
+    void (*arrive)(const struct call *call, const struct event *event, bool is_start);
 };
 
 /* What is known about an event. */
@@ -57,6 +59,7 @@ struct departure {
     const char *other;    /* one at the same instant whose time changes in another way */
     const char *doubtful; /* one that another parameter would let vanish */
     const char *missed;   /* one that another parameter would let happen */
+    const char *tied;     /* one that begins at its limit, and another parameter would not */
     const char *driven;   /* one that inputs move, whose motion is not known */
 };
 
@@ -83,5 +86,5 @@ struct gradients_room {
 void gradients_depart(const struct call *call, const struct event *event);
 
 /* Returns the gradients to a fixed time, with the modes and values after the event. Writes why they
- * are not exact. */
-void gradients_arrive(const struct call *call, const struct event *event);
+ * are not exact. is_start: at the end of the initialization. */
+void gradients_arrive(const struct call *call, const struct event *event, bool is_start);

@@ -450,7 +450,7 @@ enum status relations_update(const struct relations *model, struct relations_roo
         }
     }
     if (status == STATUS_OK && model->gradients != NULL) {
-        model->gradients->arrive(&call, event);
+        model->gradients->arrive(&call, event, !was_begun);
     }
     const int wrong = status == STATUS_OK && !fires ? modes_contradiction(&call) : -1;
     if (wrong >= 0) {

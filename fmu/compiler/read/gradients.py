@@ -22,6 +22,7 @@ from . import keys
 from .content import (
     CALCULATED,
     COUNTS,
+    FOLLOWS,
     OPTIONS,
     Expression,
     ModelFile,
@@ -35,6 +36,7 @@ ARE_EXACT = "gradients_are_exact"
 START = re.compile(r"start\(\s*(.+?)\s*\)")
 OF_IMPACTS = ("impulse", "impulses", "loss")  # of stops
 STEPS = {"floor", "ceil", "round", "sign"}
+CONTINUOUS = ("abs", "min", "max")  # switch where both branches are equal
 SHIFT = "shift"  # leaf: derivative of the time of an event
 
 
@@ -69,6 +71,7 @@ class Gradients:
     # relations of slopes with 0, and the relations whose distances have these slopes
     watched: dict[str, str] = field(default_factory=dict)
     relations: int = 0  # of the file; those of slopes follow
+    kinks: set[str] = field(default_factory=set)  # relations where both branches are equal
 
     def seeds(
         self, graph: Graph, i: int, at_event: Iterable[Value] | None = None
@@ -116,6 +119,9 @@ def _by(file: ModelFile, text: str) -> By:
     variable = file.variables.get(start[1] if start else text)
     if variable is None:
         known = [v.name for v in file.of("states" if start else "parameters")]
+        array = [name for name in known if name.startswith(f"{start[1] if start else text}[")]
+        if array:
+            raise ModelFileError(f"is an array, expected its elements, {array[0]} ...")
         raise ModelFileError("no such variable" + meant(start[1] if start else text, known))
     if start and variable.section != "states":
         raise ModelFileError(f"{variable.name} is in {variable.place}, expected a state")
@@ -125,6 +131,8 @@ def _by(file: ModelFile, text: str) -> By:
         raise ModelFileError(f"is a state, expected a parameter or start({variable.name})")
     if variable.section == OPTIONS:
         raise ModelFileError("expected a real parameter")
+    if not start and variable.section == FOLLOWS:
+        raise ModelFileError("follows from others: name those")
     if not start and variable.section != "parameters":
         raise ModelFileError(f"is in {variable.place}, expected a parameter")
     return By(text, variable, bool(start))
@@ -207,6 +215,8 @@ def _watch(file: ModelFile) -> None:
     pairs = [*zip(graph.relations.values(), graph.nodes, texts, strict=True)]
     file.gradients.relations = len(pairs)
     for relation, node, text in pairs:
+        if node.op in CONTINUOUS:
+            file.gradients.kinks.add(relation.name)
         if node.op not in RELATIONS or relation.time is not None:
             continue
         (slope,) = graph.derivatives([relation.distance], motion)

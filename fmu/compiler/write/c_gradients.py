@@ -36,6 +36,7 @@ def parts(events: Events) -> dict[str, object]:
         size=", ".join(repr(given.size) for given in by),
         names=", ".join(text(name[:100]) for name in [*file.relation_texts, *limits]) or "NULL",
         relations=file.gradients.relations,
+        kinks=", ".join(str(name in file.gradients.kinks).lower() for name in names) or "false",
         watched=", ".join(map(str, watched)) or "-1",
         rates=_rates(events),
         crossings=[line for i, distance in enumerate(distances)
@@ -121,9 +122,10 @@ def _crossing(events: Events, index: int, distance: Value) -> list[str]:
     motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
     parameters = {by.variable.leaf for by in gradients.by if not by.is_start}
     (slopes,) = graph.gradients([distance], [*motion, *gradients.discrete, *parameters])
-    terms = [graph.simple("*", slope, motion[x]) for x, slope in slopes.items() if x in motion]
-    slope, size = _sums(events, code, terms)
-    stores = [store("to->slope", slope), store("to->size", size)]
+    terms = {x: graph.simple("*", slope, motion[x]) for x, slope in slopes.items() if x in motion}
+    slope, size = _sums(events, code, [*terms.values()])
+    drift, _ = _sums(events, code, [term for x, term in terms.items() if x.op != "state"])
+    stores = [store("to->slope", slope), store("to->size", size), store("to->drift", drift)]
     if index < gradients.relations:  # forces that hold contacts have long derivatives
         (whole,) = graph.derivatives([distance], motion)
         (curvature,) = graph.derivatives([whole], motion)
