@@ -41,7 +41,7 @@ static struct crossing crossing_of(const struct call *call, int relation) {
     const struct gradients *gradients = call->model->gradients;
     double *by = call->room.gradients.by;
     struct crossing found = {.by = by, .sizes = by + gradients->count};
-    gradients->cross(call->values, call->t, call->du, relation, &found);
+    gradients->cross(call->values, call->t, call->du, call->room.gradients.rate, relation, &found);
     return found;
 }
 

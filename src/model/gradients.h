@@ -40,9 +40,10 @@ struct gradients {
 
     /* Writes the rates of the states. */
     void (*rates)(const void *values, double t, double rate[]);
-    /* Writes how the distance of a relation, or behind them of a limit of contacts, moves. */
-    void (*cross)(const void *values, double t, const double du[], int relation,
-                  struct crossing *to);
+    /* Writes how the distance of a relation, or behind them of a limit of contacts, moves.
+     * rate: of the states. */
+    void (*cross)(const void *values, double t, const double du[], const double rate[],
+                  int relation, struct crossing *to);
     /* Writes derivatives of the time of a sampler's next tick by each parameter. */
     void (*tick)(const void *values, int sampler, double shift[]);
 

@@ -306,7 +306,7 @@ class Events:
             timed=[".next_time = next_time,"] if timed or file.sampled else [],
             table=table or ["{0},"],
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
-            **c_gradients.parts(self),
+            **c_gradients.parts(self, in_domain),
             **c_possible.parts(self),
             indicators=searched.assign(indicators).lines(),
             **self._is_known(),

@@ -19,8 +19,11 @@ if TYPE_CHECKING:
 NONE = {"gradients": [], "of_gradients": [], "room_of_gradients": ", {0}"}
 
 
-def parts(events: Events) -> dict[str, object]:
-    """Return the functions, the member of struct relations and the initializer of the memory."""
+def parts(events: Events, in_domain: str) -> dict[str, object]:
+    """Return the functions, the member of struct relations and the initializer of the memory.
+
+    in_domain: behind the name of the right-hand side.
+    """
     file = events.file
     if file.gradients is None:
         return NONE
@@ -38,7 +41,9 @@ def parts(events: Events) -> dict[str, object]:
         relations=file.gradients.relations,
         kinks=", ".join(str(name in file.gradients.kinks).lower() for name in names) or "false",
         watched=", ".join(map(str, watched)) or "-1",
-        rates=_rates(events),
+        in_domain=in_domain,
+        state_offset=_offset(file, "states"),
+        inputs=_offset(file, "inputs"),
         crossings=[line for i, distance in enumerate(distances)
                    for line in _crossing(events, i, distance)],
         ticks=_ticks(events),
@@ -60,6 +65,12 @@ def parts(events: Events) -> dict[str, object]:
         "of_gradients": [".gradients = &gradients,"],
         "room_of_gradients": f", GRADIENTS_ROOM({len(by)}, {len(states)}, {of_contacts})",
     }
+
+
+def _offset(file: ModelFile, section: str) -> str:
+    """Return where the values of a section begin."""
+    found = [file.fields.value(v.name) for v in file.of(section)]
+    return f"offsetof(struct equations_values, {found[0]})" if found else "0"
 
 
 def shifts(file: ModelFile) -> dict[tuple[str, str], Operand]:
@@ -106,20 +117,15 @@ def along(file: ModelFile, leaves: Leaves) -> dict[str, list[str]]:
     return {"measure_along": [*head, *indented(lines), "}", ""], "of_gradients": members}
 
 
-def _rates(events: Events) -> list[str]:
-    code = Code(events.leaves)
-    states = events.file.of("states")[: len(events.file.gradients.states)]
-    return code.assign({Place("rate[", i, "]"): x.value for i, x in enumerate(states)}).lines()
-
-
 def _crossing(events: Events, index: int, distance: Value) -> list[str]:
     """How a distance moves by the time and by each parameter."""
     file, graph = events.file, events.graph
     gradients, inputs = file.gradients, file.of("inputs")
-    code = Code(events.leaves.but(shifts(file)))
-    motion = {x.leaf: x.value for x in file.of("states") if x.leaf in gradients.states}
+    states = [x for x in file.of("states") if x.leaf in gradients.states]
+    rates = {("first", x.name): Place("rate[", i, "]") for i, x in enumerate(states)}
+    code = Code(events.leaves.but(shifts(file) | rates))
+    motion = {x.leaf: graph.value("first", name=x.name) for x in [*states, *inputs]}
     motion |= {graph.value("time"): graph.number(1.0)}
-    motion |= {u.leaf: graph.value("first", name=u.name) for u in inputs}
     parameters = {by.variable.leaf for by in gradients.by if not by.is_start}
     (slopes,) = graph.gradients([distance], [*motion, *gradients.discrete, *parameters])
     terms = {x: graph.simple("*", slope, motion[x]) for x, slope in slopes.items() if x in motion}
@@ -127,6 +133,7 @@ def _crossing(events: Events, index: int, distance: Value) -> list[str]:
     drift, _ = _sums(events, code, [term for x, term in terms.items() if x.op != "state"])
     stores = [store("to->slope", slope), store("to->size", size), store("to->drift", drift)]
     if index < gradients.relations:  # forces that hold contacts have long derivatives
+        motion |= {x.leaf: x.value for x in states}
         (whole,) = graph.derivatives([distance], motion)
         (curvature,) = graph.derivatives([whole], motion)
         stores.append(store("to->curvature", code.of(curvature)))

@@ -311,6 +311,13 @@ def _domains(
         "                                    int last, double row[][SERIES_LENGTH]);",
         "",
     ]
+    if file.gradients:
+        declared[-1:] = [
+            "static enum status right_hand_side_in_domain(const void *values, double t,",
+            "                                             const double x[], const double u[],",
+            "                                             double dx[]);",
+            "",
+        ]
     if c_undefined.has_conditions(file):
         declared[-1:] = [c_undefined.DECLARED_IN_DOMAIN, ""]
     return {
