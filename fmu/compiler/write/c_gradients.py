@@ -126,30 +126,36 @@ def _crossing(events: Events, index: int, distance: Value) -> list[str]:
     code = Code(events.leaves.but(shifts(file) | rates))
     motion = {x.leaf: graph.value("first", name=x.name) for x in [*states, *inputs]}
     motion |= {graph.value("time"): graph.number(1.0)}
-    parameters = {by.variable.leaf for by in gradients.by if not by.is_start}
-    (slopes,) = graph.gradients([distance], [*motion, *gradients.discrete, *parameters])
-    terms = {x: graph.simple("*", slope, motion[x]) for x, slope in slopes.items() if x in motion}
-    slope, size = _sums(events, code, [*terms.values()])
-    drift, _ = _sums(events, code, [term for x, term in terms.items() if x.op != "state"])
-    stores = [store("to->slope", slope), store("to->size", size), store("to->drift", drift)]
-    if index < gradients.relations:  # forces that hold contacts have long derivatives
-        motion |= {x.leaf: x.value for x in states}
-        (whole,) = graph.derivatives([distance], motion)
+    stores = []
+    if any((u.leaf.op, u.name) in distance.leaves for u in inputs):
+        stores.append(store("to->is_of_input", "true"))
+    along = [motion, *(gradients.seeds(graph, j) for j in range(len(gradients.by)))]
+    if index >= len(events.relations):  # forces that hold contacts have long derivatives
+        terms = [[graph.derivatives([distance], seeds)[0]] for seeds in along]
+    else:
+        leaves = dict.fromkeys(leaf for seeds in along for leaf in seeds)
+        (slopes,) = graph.gradients([distance], leaves)
+        terms = [
+            [graph.simple("*", of, seeds[x]) for x, of in slopes.items() if x in seeds]
+            for seeds in along
+        ]
+        drift = [of for x, of in slopes.items() if x.op == "time"]
+        drift += [graph.simple("*", slopes[u.leaf], motion[u.leaf])
+                  for u in inputs if u.leaf in slopes]  # fmt: skip
+        stores.append(store("to->drift", _sums(code, drift)[0]))
+        (whole,) = graph.derivatives([distance], motion | {x.leaf: x.value for x in states})
         (curvature,) = graph.derivatives([whole], motion)
         stores.append(store("to->curvature", code.of(curvature)))
-    if any(u.leaf in slopes for u in inputs):
-        stores.append(store("to->is_of_input", "true"))
-    for j in range(len(gradients.by)):
-        seeds = gradients.seeds(graph, j)
-        terms = [graph.simple("*", of, seeds[x]) for x, of in slopes.items() if x in seeds]
-        total, size = _sums(events, code, terms)
-        stores += [store(Place("to->by[", j, "]"), total)]
-        stores += [store(Place("to->sizes[", j, "]"), size)]
+    names = ["to->slope", *(Place("to->by[", j, "]") for j in range(len(gradients.by)))]
+    sizes = ["to->size", *(Place("to->sizes[", j, "]") for j in range(len(gradients.by)))]
+    for name, size, own in zip(names, sizes, terms, strict=True):
+        total, magnitude = _sums(code, own)
+        stores += [store(name, total), store(size, magnitude)]
     code.statements += stores
     return [f"if (relation == {index}) {{", *indented(code.lines()), "}"]
 
 
-def _sums(events: Events, code: Code, terms: list[Value]) -> tuple[Operand, Operand]:
+def _sums(code: Code, terms: list[Value]) -> tuple[Operand, Operand]:
     """Return the sum of terms, and of their magnitudes."""
     given = [code.of(term) for term in terms] or [0.0]
     sizes = [("fabs", code.constant(operand)) for operand in given] if terms else [0.0]
