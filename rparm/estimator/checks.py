@@ -15,7 +15,7 @@ import numpy as np
 from rparm.errors import UserError
 from rparm.estimator.request import Request
 from rparm.estimator.terms import Terms
-from rparm.fmu_tools.compiler.expressions.expression import OPERATIONS, RELATIONS, in_order, names
+from rparm.fmu_tools.compiler.expressions.expression import OPERATIONS, in_order, names
 from rparm.fmu_tools.compiler.graph.graph import Value
 
 MOST_OPERATIONS = 20_000
@@ -56,8 +56,7 @@ def _of_changes(terms: Terms) -> Iterator[str]:
     """Yield warnings of events that may happen again, and of held values taken as exact."""
     file = terms.plant.path.name
     for event in terms.plant.events:
-        nodes = in_order([e.tree for e in event.conditions])
-        moving = [n for n in nodes if n.op in RELATIONS and terms.moving(names(n))]
+        moving = terms.relations(*(e.tree for e in event.conditions))
         if len(moving) == 1 and event.reinit:
             what = "an update may pass its limit from the other side, and it happens again"
             yield f'{file}: [events.{event.name}]: {what}: write while with a direction, as "v < 0"'

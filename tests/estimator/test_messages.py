@@ -30,6 +30,21 @@ measure = { phi = "0.02 rad" }
 noise = { torque = "0.05 N.m" }
 start = { phi = "0.2 rad" }
 """
+HEAD = 'name = "O"\nestimator = "plant.toml"\nevery = 0.1\n'
+BALL = """name = "Ball"
+[parameters]
+e = { start = 0.8 }
+[states]
+h = { start = 1, derivative = "v" }
+v = { derivative = "-9.81" }
+[where]
+low = "h < 0"
+hit = "low and e > 0"
+[events.impact]
+when = "hit"
+while = "v < 0"
+reinit = { v = "-e * v" }
+"""
 MISTAKES = tomllib.loads(Path(__file__).with_name("mistakes.toml").read_text(encoding="utf-8"))
 
 
@@ -42,6 +57,14 @@ def refused(folder: Path, plant: str, request: str) -> str:
     place, text = str(error.value).split(": ", 1)
     assert place == str(file)
     return text.replace(str(folder), "FOLDER")
+
+
+def warned(folder: Path, plant: str, request: str) -> tuple[list[str], str]:
+    """Return warnings of an estimator, and the text of its equations."""
+    (folder / "plant.toml").write_text(plant, encoding="utf-8")
+    file, equations = folder / "estimator.toml", folder / "equations.toml"
+    file.write_text(HEAD + request, encoding="utf-8")
+    return write(file, equations), equations.read_text(encoding="utf-8")
 
 
 def refuses(rows: list[list[str]]) -> pytest.MarkDecorator:
@@ -93,6 +116,16 @@ set = { u = "-v" }
         "measure: h does not show x: sigma may grow",
         "plant.toml: mode resting: not measured, the filter takes it from its estimate",
     ]
+
+
+def test_an_event_of_a_named_condition_has_its_saltation_matrix(tmp_path: Path) -> None:
+    plant = BALL.replace('while = "v < 0"\n', "")
+    request = "measure = { h = 0.1 }\nstart = { v = 1 }\n"
+    warnings, text = warned(tmp_path, plant, request)
+    assert "[events.after_impact]" in text and "an update may pass its limit" in warnings[0]
+    named = plant.replace("hit =", 'falls = "v < 0"\nhit =')
+    named = named.replace('when = "hit"', 'when = "hit"\nwhile = "falls"')
+    assert warned(tmp_path, named, request)[0] == []
 
 
 def test_the_command_wants_an_estimator_and_keeps_its_equations(tmp_path: Path) -> None:
