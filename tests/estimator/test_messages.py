@@ -128,6 +128,17 @@ def test_an_event_of_a_named_condition_has_its_saltation_matrix(tmp_path: Path) 
     assert warned(tmp_path, named, request)[0] == []
 
 
+def test_files_that_are_read_are_not_written(tmp_path: Path) -> None:
+    whole = 'name = "Pendulum"\ninclude = ["parts.toml"]\n'
+    parts = PLANT.replace('name = "Pendulum"\n', "")
+    for name, text in {"plant": whole, "parts": parts, "estimator": REQUEST}.items():
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    for name, text in {"plant": whole, "parts": parts, "estimator": REQUEST}.items():
+        with pytest.raises(UserError, match=f"{name}.toml: .* is made from this file"):
+            write(tmp_path / "estimator.toml", tmp_path / f"{name}.toml")
+        assert (tmp_path / f"{name}.toml").read_text(encoding="utf-8") == text
+
+
 def test_the_command_wants_an_estimator_and_keeps_its_equations(tmp_path: Path) -> None:
     """FMUs of the kept equations have the same bits; the lock file is the estimator's."""
     for name, text in {"plant": PLANT, "estimator": REQUEST}.items():
