@@ -16,12 +16,14 @@ from rparm.errors import UserError
 from rparm.estimator.request import Request
 from rparm.estimator.terms import Terms
 from rparm.fmu_tools.compiler.expressions.expression import OPERATIONS, in_order, names
-from rparm.fmu_tools.compiler.graph.graph import Value
+from rparm.fmu_tools.compiler.graph.graph import SWITCHING, Value
+from rparm.fmu_tools.compiler.read.content import COUNTS, SWITCHES
 
 MOST_OPERATIONS = 20_000
 POINTS = 3  # at each the rank may be lower by chance
 RELATIVE, PART = 1e-9, 1e-6  # singular values, and parts of vectors, that count as 0
 MOVED = (0.15, 0.3)  # how far inputs and states are from the start, of their size
+BRANCHES = ("if", "mode", "element", *SWITCHING)  # also those of abs, min and max
 OF_DOUBLES = OPERATIONS | {
     "if": lambda condition, a, b: a if condition else b, "pow": math.pow, "isnan": math.isnan,
     "isfinite": math.isfinite, "value_of": lambda x: x, "moving_as": lambda x, _: x,
@@ -39,13 +41,17 @@ def check(terms: Terms) -> list[str]:
         if not any(terms.p(x, y) for x in terms.h[name] for y in terms.estimated):
             what = "nothing that moves it has a spread: give start, unknown or noise"
             raise UserError(f"{request.path}: measure: {name}: {what}")
-    unseen, measured = _unseen(request), ", ".join(request.measure)
-    if unknown := [x for x in unseen if x in request.unknown]:
-        what = f"{', '.join(unknown)} cannot be told from {measured}: other values fit as well"
-        raise UserError(f"{request.path}: unknown: {what}")
+    unseen, is_smooth = _unseen(request), _is_smooth(request)
+    shows = f"{', '.join(request.measure)} {'does' if len(request.measure) == 1 else 'do'} not show"
     found = [*_of_changes(terms)]
-    if unseen:
-        found.append(f"measure: {measured} does not show {', '.join(unseen)}: sigma may grow")
+    if unknown := [x for x in unseen if x in request.unknown]:
+        what = f"unknown: {shows} {', '.join(unknown)}"
+        if is_smooth:
+            raise UserError(f"{request.path}: {what}: other values fit as well")
+        found.append(f"{what} near the start: only events, samplers or other branches may")
+    if states := [x for x in unseen if x not in request.unknown]:
+        where = "" if is_smooth else " near the start"
+        found.append(f"measure: {shows} {', '.join(states)}{where}: sigma may grow")
     if plant.modes:
         what = "not measured, the filter takes it from its estimate"
         found.append(f"{plant.path.name}: mode {', '.join(plant.modes)}: {what}")
@@ -66,6 +72,16 @@ def _of_changes(terms: Terms) -> Iterator[str]:
             if variable and variable.is_real and terms.moving(names(new.tree)):
                 what = "follows from states, the filter takes it as exact"
                 yield f"{file}: [discrete]: {name}: {what}"
+
+
+def _is_smooth(request: Request) -> bool:
+    """Return whether slopes near the start describe the plant elsewhere, too."""
+    plant = request.plant
+    if plant.changes or plant.modes or plant.of("discrete", COUNTS, SWITCHES):
+        return False
+    values = [v.value for v in plant.of("states")]
+    values += [v.value for v in map(plant.variables.get, request.measure) if v.leaf is None]
+    return not any(v.op in BRANCHES for v in in_order(values))
 
 
 def _unseen(request: Request) -> list[str]:

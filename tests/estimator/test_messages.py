@@ -113,7 +113,7 @@ set = { u = "-v" }
         "plant.toml: [events.impact]: an update may pass its limit from the other side, and it "
         'happens again: write while with a direction, as "v < 0"',
         "plant.toml: [discrete]: u: follows from states, the filter takes it as exact",
-        "measure: h does not show x: sigma may grow",
+        "measure: h does not show x near the start: sigma may grow",
         "plant.toml: mode resting: not measured, the filter takes it from its estimate",
     ]
 
@@ -126,6 +126,15 @@ def test_an_event_of_a_named_condition_has_its_saltation_matrix(tmp_path: Path) 
     named = plant.replace("hit =", 'falls = "v < 0"\nhit =')
     named = named.replace('when = "hit"', 'when = "hit"\nwhile = "falls"')
     assert warned(tmp_path, named, request)[0] == []
+
+
+def test_what_only_events_or_branches_may_show_is_a_warning(tmp_path: Path) -> None:
+    near = "near the start: only events, samplers or other branches may"
+    request = "measure = { h = 0.1 }\nstart = { v = 1 }\nunknown = { e = 0.1 }\n"
+    assert warned(tmp_path, BALL, request)[0] == [f"unknown: h does not show e {near}"]
+    heater = BALL[: BALL.index("[where]")].replace("-9.81", "e * max(h - 5, 0)")
+    request = request.replace("{ h = 0.1 }", "{ h = 0.1, v = 1 }")
+    assert warned(tmp_path, heater, request)[0] == [f"unknown: h, v do not show e {near}"]
 
 
 def test_files_that_are_read_are_not_written(tmp_path: Path) -> None:
