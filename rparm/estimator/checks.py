@@ -16,12 +16,13 @@ from rparm.errors import UserError
 from rparm.estimator.request import Request
 from rparm.estimator.terms import Terms
 from rparm.fmu_tools.compiler.expressions.expression import OPERATIONS, in_order, names
-from rparm.fmu_tools.compiler.graph.graph import SWITCHING, Value
+from rparm.fmu_tools.compiler.graph.graph import SWITCHING, Relation, Value
 from rparm.fmu_tools.compiler.read.content import COUNTS, SWITCHES
 
 MOST_OPERATIONS = 20_000
 POINTS = 3  # at each the rank may be lower by chance
 RELATIVE, PART = 1e-9, 1e-6  # singular values, and parts of vectors, that count as 0
+STEPS = 20  # of Newton's method
 MOVED = (0.15, 0.3)  # how far inputs and states are from the start, of their size
 BRANCHES = ("if", "mode", "element", *SWITCHING)  # also those of abs, min and max
 OF_DOUBLES = OPERATIONS | {
@@ -43,7 +44,7 @@ def check(terms: Terms) -> list[str]:
             raise UserError(f"{request.path}: measure: {name}: {what}")
     unseen, is_smooth = _unseen(request), _is_smooth(request)
     shows = f"{', '.join(request.measure)} {'does' if len(request.measure) == 1 else 'do'} not show"
-    found = [*_of_changes(terms)]
+    found = [*_of_changes(terms), *_of_switches(terms)]
     if unknown := [x for x in unseen if x in request.unknown]:
         what = f"unknown: {shows} {', '.join(unknown)}"
         if is_smooth:
@@ -72,6 +73,52 @@ def _of_changes(terms: Terms) -> Iterator[str]:
             if variable and variable.is_real and terms.moving(names(new.tree)):
                 what = "follows from states, the filter takes it as exact"
                 yield f"{file}: [discrete]: {name}: {what}"
+
+
+def _of_switches(terms: Terms) -> Iterator[str]:
+    """Yield warnings of rates that jump where a state passes a limit, without a mode."""
+    plant, graph = terms.plant, terms.plant.graph
+    leaves = set().union(*(v.value.leaves for v in plant.of("states")))
+    whole = {
+        segment.low.name
+        for name, segment in graph.segments.items()
+        if ("integer", name) in leaves and not segment.bounds
+    }
+    random, found = np.random.default_rng(0), {}
+    for (name, relation), text in zip(graph.relations.items(), plant.relation_texts, strict=False):
+        by = terms.slopes(relation.distance, terms.leaves)
+        if by and (name in whole or ("mode", name) in leaves and _jump(terms, name, by, random)):
+            limit, _, place = text.rpartition(" of ")
+            found.setdefault(place, []).append(limit)
+    what = "rates jump there, the covariance does not see it: write a mode that an event sets"
+    for place, limits in found.items():
+        where = f"{place}: {', '.join(limits)}" if limits[0] else place
+        yield f"{plant.path.name}: {where}: {what}"
+
+
+def _jump(terms: Terms, mode: str, by: Sequence[str], random: np.random.Generator) -> bool:
+    """Return whether rates differ by a mode where its distance is 0; False if that is not known."""
+    request, graph = terms.request, terms.plant.graph
+    distance, rates = graph.relations[mode].distance, [v.value for v in terms.plant.of("states")]
+    moved = [terms.plant.variables[name].leaf for name in by]
+    (slopes,) = graph.gradients([distance], moved)
+    rows = [[distance, *(slopes.get(leaf, graph.number(0.0)) for leaf in moved)]]
+    for _ in range(POINTS):
+        point = _point(request, random)
+        first = _numbers([rates], point, request)
+        for _ in range(STEPS):
+            found = _numbers(rows, point, request)
+            if found is None or not found[0, 1:].any():
+                break
+            fastest = int(np.argmax(np.abs(found[0, 1:])))
+            place = moved[fastest].op, by[fastest]
+            point[place] -= found[0, 0] / found[0, 1 + fastest]
+        sides = [_numbers([rates], point, request, {mode: holds}) for holds in (False, True)]
+        if found is None or abs(found[0, 0]) > RELATIVE or any(m is None for m in (first, *sides)):
+            continue
+        if np.any(np.abs(sides[1] - sides[0]) > PART * sum(map(np.abs, (first, *sides)))):
+            return True
+    return False
 
 
 def _is_smooth(request: Request) -> bool:
@@ -132,17 +179,22 @@ def _point(request: Request, random: np.random.Generator) -> dict[tuple[str, str
 
 
 def _numbers(
-    slopes: Sequence[Sequence[Value]], point: Mapping[tuple[str, str], float], request: Request
+    slopes: Sequence[Sequence[Value]],
+    point: Mapping[tuple[str, str], float],
+    request: Request,
+    modes: Mapping[str, bool] | None = None,
 ) -> np.ndarray | None:
-    """Evaluate slopes; None where an operation is not known or not defined."""
-    relations, found = request.plant.graph.relations, {}
+    """Evaluate slopes, with given modes; None where an operation is not known or not defined."""
+    relations, found, modes = request.plant.graph.relations, {}, modes or {}
     roots = [value for row in slopes for value in row]
     with suppress(KeyError, ArithmeticError, ValueError):
-        for value in in_order([*(r.distance for r in relations.values()), *roots]):
+        for value in in_order([*_distances(roots, relations), *roots]):
             if value.op == "number":
                 found[value] = value.number
             elif value.arguments:
                 found[value] = OF_DOUBLES[value.op](*(found[a] for a in value.arguments))
+            elif value.op == "mode" and value.name in modes:
+                found[value] = modes[value.name]
             elif value.op == "mode" and value.name in relations:
                 found[value] = found[relations[value.name].distance] > 0
             else:
@@ -150,3 +202,13 @@ def _numbers(
         matrix = np.array([[found[value] for value in row] for row in slopes])
         return matrix if np.isfinite(matrix).all() else None
     return None
+
+
+def _distances(roots: Sequence[Value], relations: Mapping[str, Relation]) -> list[Value]:
+    """Return distances of relations that decide values, those of others first."""
+    needed, todo = set(), [*roots]
+    for value in todo:
+        more = {name for op, name in value.leaves if op == "mode" and name in relations} - needed
+        needed |= more
+        todo += [relations[name].distance for name in more]
+    return [r.distance for name, r in relations.items() if name in needed]

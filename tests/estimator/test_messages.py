@@ -137,6 +137,35 @@ def test_what_only_events_or_branches_may_show_is_a_warning(tmp_path: Path) -> N
     assert warned(tmp_path, heater, request)[0] == [f"unknown: h, v do not show e {near}"]
 
 
+@pytest.mark.parametrize(
+    ("rate", "jumping"),
+    [
+        ("20 if s > 0.6 else 2", "[states] s: s > 0.6"),
+        ("near - s", "[where] near: s > e"),
+        ("-sign(s) * e", "[states] s: s > 0, s < 0"),
+        ("-floor(s)", "[states] s: floor(s)"),
+        ("abs(s - 0.6) - max(s, 0.6) - min(s, e)", ""),
+        ("s * abs(s) + s**2 * sign(s)", ""),
+        ("s if s < e else e", ""),
+        ("1 if time > 2 else 0", ""),
+    ],
+)
+def test_rates_that_jump_without_an_event_are_a_warning(
+    rate: str, jumping: str, tmp_path: Path
+) -> None:
+    plant = f"""name = "Plant"
+[parameters]
+e = {{ start = 0.5 }}
+[states]
+s = {{ start = 1, derivative = "{rate}" }}
+[where]
+near = "1 if s > e else 0"
+"""
+    found, _ = warned(tmp_path, plant, "measure = { s = 0.1 }\nstart = { s = 1 }\n")
+    jump = "rates jump there, the covariance does not see it: write a mode that an event sets"
+    assert found == ([f"plant.toml: {jumping}: {jump}"] if jumping else [])
+
+
 def test_files_that_are_read_are_not_written(tmp_path: Path) -> None:
     whole = 'name = "Pendulum"\ninclude = ["parts.toml"]\n'
     parts = PLANT.replace('name = "Pendulum"\n', "")
