@@ -53,6 +53,12 @@ def check(terms: Terms) -> list[str]:
     if states := [x for x in unseen if x not in request.unknown]:
         where = "" if is_smooth else " near the start"
         found.append(f"measure: {shows} {', '.join(states)}{where}: sigma may grow")
+    for name in request.measure:
+        variable = plant.variables[name]
+        direct = terms.slopes(variable.leaf or variable.value, terms.noisy)
+        if both := [u for u in direct if any(u in by for by in terms.b.values())]:
+            what = "moves it directly, its noise there counts as independent of that of the states"
+            found.append(f"measure: {name}: {', '.join(both)} {what}")
     if plant.modes:
         what = "not measured, the filter takes it from its estimate"
         found.append(f"{plant.path.name}: mode {', '.join(plant.modes)}: {what}")

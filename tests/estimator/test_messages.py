@@ -166,6 +166,22 @@ near = "1 if s > e else 0"
     assert found == ([f"plant.toml: {jumping}: {jump}"] if jumping else [])
 
 
+def test_a_noisy_input_that_moves_a_measurement_directly_is_a_warning(tmp_path: Path) -> None:
+    plant = """name = "Plant"
+[inputs]
+u = {}
+w = {}
+[states]
+s = { derivative = "u - s" }
+[outputs]
+y = { value = "s + u" }
+z = { value = "s + w" }
+"""
+    request = "measure = { y = 0.1, z = 0.1 }\nnoise = { u = 0.1, w = 0.1 }\n"
+    what = "moves it directly, its noise there counts as independent of that of the states"
+    assert warned(tmp_path, plant, request)[0] == [f"measure: y: u {what}"]
+
+
 def test_files_that_are_read_are_not_written(tmp_path: Path) -> None:
     whole = 'name = "Pendulum"\ninclude = ["parts.toml"]\n'
     parts = PLANT.replace('name = "Pendulum"\n', "")
