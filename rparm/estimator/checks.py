@@ -44,7 +44,7 @@ def check(terms: Terms) -> list[str]:
             raise UserError(f"{request.path}: measure: {name}: {what}")
     unseen, is_smooth = _unseen(request), _is_smooth(request)
     shows = f"{', '.join(request.measure)} {'does' if len(request.measure) == 1 else 'do'} not show"
-    found = [*_of_changes(terms), *_of_switches(terms)]
+    found = [*_of_period(terms), *_of_changes(terms), *_of_switches(terms)]
     if unknown := [x for x in unseen if x in request.unknown]:
         what = f"unknown: {shows} {', '.join(unknown)}"
         if is_smooth:
@@ -63,6 +63,26 @@ def check(terms: Terms) -> list[str]:
         what = "not measured, the filter takes it from its estimate"
         found.append(f"{plant.path.name}: mode {', '.join(plant.modes)}: {what}")
     return found
+
+
+def _of_period(terms: Terms) -> Iterator[str]:
+    """Yield warnings of a period that is long, or that never ends."""
+    request, plant = terms.request, terms.plant
+    every, stop = request.every, plant.experiment["stop"]
+    for key, time in (("every", every), ("offset", request.offset)):
+        if time > stop:
+            yield f"{key}: {time:g} s is above the stop time of {plant.path.name}, {stop:g} s"
+    states = plant.of("states")
+    rows = plant.graph.gradients([v.value for v in states], [v.leaf for v in states])
+    zero = plant.graph.number(0.0)
+    slopes = [[row.get(v.leaf, zero) for v in states] for row in rows]
+    if not any(terms.b.values()) or len(in_order(sum(slopes, []))) > MOST_OPERATIONS:
+        return  # what is not noisy is exact for any period
+    a = _numbers(slopes, _point(request), request)
+    fastest = 0.0 if a is None else float(np.abs(np.linalg.eigvals(a)).max())
+    if every * fastest > 1:
+        what = f"the fastest time constant of {plant.path.name} at the start, {1 / fastest:.2g} s"
+        yield f"every: {every:g} s is above {what}: it takes noise as white, sigma may be wrong"
 
 
 def _of_changes(terms: Terms) -> Iterator[str]:
@@ -172,14 +192,17 @@ def _null(matrix: np.ndarray, columns: Sequence[str]) -> list[str]:
     return [name for name, part in zip(columns, parts, strict=True) if part > PART]
 
 
-def _point(request: Request, random: np.random.Generator) -> dict[tuple[str, str], float]:
-    """Return values of leaves, by operation and name."""
+def _point(
+    request: Request, random: np.random.Generator | None = None
+) -> dict[tuple[str, str], float]:
+    """Return values of leaves, by operation and name: at the start, or at random near it."""
     found = {("time", ""): 0.0}
     for v in request.plant.variables.values():
         if v.leaf is not None:
             start = float(v.start or 0.0)
             moves = v.section in ("inputs", "states") or v.name in request.unknown
-            size = (abs(start) or v.nominal or 1.0) * random.uniform(*MOVED)
+            part = random.uniform(*MOVED) if random else 0.0
+            size = (abs(start) or v.nominal or 1.0) * part
             found[v.leaf.op, v.name] = start + moves * size
     return found | {("mode", name): float(start) for name, start in request.plant.modes.items()}
 

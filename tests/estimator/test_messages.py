@@ -182,6 +182,27 @@ z = { value = "s + w" }
     assert warned(tmp_path, plant, request)[0] == [f"measure: y: u {what}"]
 
 
+def test_a_long_period_is_a_warning(tmp_path: Path) -> None:
+    plant = """name = "Plant"
+experiment = { stop = 0.05 }
+[parameters]
+k = { start = 20 }
+[inputs]
+u = {}
+[states]
+s = { start = 1, derivative = "u - k * s**2" }
+"""
+    request = "measure = { s = 0.1 }\noffset = 1\nnoise = { u = 0.1 }\n"
+    assert warned(tmp_path, plant, request)[0] == [
+        "every: 0.1 s is above the stop time of plant.toml, 0.05 s",
+        "offset: 1 s is above the stop time of plant.toml, 0.05 s",
+        "every: 0.1 s is above the fastest time constant of plant.toml at the start, 0.025 s: "
+        "it takes noise as white, sigma may be wrong",
+    ]
+    plant = plant.replace("stop = 0.05", "stop = 5").replace("start = 20", "start = 2")
+    assert warned(tmp_path, plant, request)[0] == []
+
+
 def test_files_that_are_read_are_not_written(tmp_path: Path) -> None:
     whole = 'name = "Pendulum"\ninclude = ["parts.toml"]\n'
     parts = PLANT.replace('name = "Pendulum"\n', "")
