@@ -203,6 +203,13 @@ s = { start = 1, derivative = "u - k * s**2" }
     assert warned(tmp_path, plant, request)[0] == []
 
 
+def test_an_array_is_no_output_but_its_elements_are(tmp_path: Path) -> None:
+    states = '"T[i]" = { for = "i = 1..2", derivative = "-T[i]" }\nTa = { derivative = "-Ta" }\n'
+    request = HEAD + 'measure = { T = 1 }\noffset = "0 s"\n'
+    text = refused(tmp_path, f'name = "Rod"\n[states]\n{states}', request)
+    assert text == "measure: plant.toml has no such output: T, did you mean 'T[1]'?"
+
+
 def test_files_that_are_read_are_not_written(tmp_path: Path) -> None:
     whole = 'name = "Pendulum"\ninclude = ["parts.toml"]\n'
     parts = PLANT.replace('name = "Pendulum"\n', "")
@@ -220,6 +227,9 @@ def test_the_command_wants_an_estimator_and_keeps_its_equations(tmp_path: Path) 
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
     ran = python(*RPARM, "estimator", "plant.toml", folder=tmp_path)
     assert ran.returncode == 2 and "plant.toml: expected one of an estimator" in ran.stderr
+    (tmp_path / "none.toml").write_text(REQUEST.replace("estimator =", "plant ="), encoding="utf-8")
+    ran = python(*RPARM, "estimator", "none.toml", folder=tmp_path)
+    assert ran.returncode == 2 and "none.toml: estimator is missing" in ran.stderr
     arguments = ("--output", "out", "--toml", "kept/filter.toml")
     ran = python(*RPARM, "estimator", "estimator.toml", *arguments, folder=tmp_path)
     assert (ran.returncode, ran.stderr) == (0, ""), ran.stderr
