@@ -46,7 +46,10 @@ def do_new_model(options: argparse.Namespace) -> Ended:
 
 def do_estimator(options: argparse.Namespace) -> Ended:
     file, kept = options.file, options.toml
-    if ESTIMATOR not in read_toml(file):
+    given = read_toml(file)
+    if ESTIMATOR not in given and "measure" in given:
+        raise UserError(f"{file}: {ESTIMATOR} is missing: the plant's file")
+    if ESTIMATOR not in given:
         wanted = f'expected one of an estimator, with {ESTIMATOR} = "plant.toml"'
         raise UserError(f"{file}: {wanted}; {project.PROGRAM} build takes a plant's")
     paths = build(file, output=options.output or Path(), platforms=options.platforms)

@@ -28,7 +28,11 @@ OF_WHERE = ("value", "unit", "description", "type", "for")
 
 def write(file: Path, to: Path) -> list[str]:
     """Write the equations of an estimator into a file; return warnings. UserError."""
-    terms = Terms(load(file))
+    request = load(file)
+    read = (file, *request.plant.files)
+    if to.exists() and any(to.samefile(path) for path in read):
+        raise UserError(f"{to}: {file} is made from this file, expected another one to write")
+    terms = Terms(request)
     warnings = checks.check(terms)
     write_text(to, toml.written(_Equations(terms).tables(to.parent)))
     return warnings

@@ -10,13 +10,7 @@ there are then, and adds the rest. Times of samplers do not depend on states: th
 from typing import Any
 
 from rparm.estimator.terms import Terms, product, total
-from rparm.fmu_tools.compiler.expressions.expression import (
-    RELATIONS,
-    Node,
-    in_order,
-    names,
-    written,
-)
+from rparm.fmu_tools.compiler.expressions.expression import Node, names, written
 from rparm.fmu_tools.compiler.read.content import Change, Event, Expression, Sampler
 
 Rows = dict[str, dict[str, str]]  # texts by state and column
@@ -45,10 +39,7 @@ def add(terms: Terms, tables: dict[str, Any]) -> None:
 
 def passed(terms: Terms, event: Event) -> tuple[Node, ...]:
     """Return both sides of the relation that decides when: the first one that states move."""
-    for node in in_order([event.when.tree]):
-        if node.op in RELATIONS and terms.moving(names(node)):
-            return node.arguments
-    return ()
+    return next((node.arguments for node in terms.relations(event.when.tree)), ())
 
 
 class _Jump:

@@ -25,6 +25,7 @@ NAMED = {  # sections whose real variables a key names
     "unknown": (("parameters",), "a parameter"),
 }
 SHORTEST = 1e-9  # s, of periods
+SMALLEST, LARGEST = 1e-100, 1e100  # standard deviations whose squares are doubles
 REFUSED = {  # sections of plants
     "friction": "sticks in ways that no covariance describes",
     "stops": "hits in ways that this filter does not follow: write an event",
@@ -61,17 +62,24 @@ def load(path: Path) -> Request:
     """Read and check the file of an estimator; UserError."""
     given = read_toml(path)
     _check(path, given)
-    every = _positive(path, "every", given["every"], None)
-    offset = _positive(path, "offset", given["offset"], None) if given.get("offset") else 0.0
+    every = _time(path, "every", given["every"])
+    offset = _time(path, "offset", given.get("offset", 0.0))
     if every < SHORTEST:
-        raise UserError(f"{path}: every: expected {SHORTEST:g} s or more, got {every:g} s")
+        raise UserError(
+            f"{path}: every: expected {SHORTEST:g} s or more, got {show(given['every'])}"
+        )
+    if offset < 0:
+        raise UserError(f"{path}: offset: expected 0 or more, got {show(given['offset'])}")
     plant, tables = _plant(path, given[PLANT])
+    if given["name"] == plant.name:
+        what = f"{plant.path.name} has this name, too, and their FMUs would be one file"
+        raise UserError(f"{path}: name: {given['name']}: {what}: choose another one")
     about = given.get("description", "")
     found = Request(path, given["name"], about, every, offset, plant, tables)
     for key in DEVIATIONS:
         for name, sigma in given.get(key, {}).items():
             variable = _variable(path, key, name, plant)
-            getattr(found, key)[name] = _positive(path, f"{key}: {name}", sigma, variable)
+            getattr(found, key)[name] = _deviation(path, f"{key}: {name}", sigma, variable)
     if not found.measure:
         what = "expected outputs of the plant, each with its standard deviation"
         raise UserError(f"{path}: measure: {what}")
@@ -138,7 +146,8 @@ def _variable(path: Path, key: str, name: str, plant: ModelFile) -> Variable:
         return known[name]
     other, wanted = plant.variables.get(name), f"expected {what} of {plant.path.name}"
     if other is None:
-        guess = did_you_mean(name, known)
+        elements = [x for x in known if x.startswith(f"{name}[")]
+        guess = f", did you mean '{elements[0]}'?" if elements else did_you_mean(name, known)
         what = what.split()[1]
         raise UserError(f"{path}: {key}: {plant.path.name} has no such {what}: {name}{guess}")
     follows = other.section == FOLLOWS
@@ -148,14 +157,27 @@ def _variable(path: Path, key: str, name: str, plant: ModelFile) -> Variable:
     raise UserError(f"{path}: {key}: {name} is {where}, {wanted}")
 
 
-def _positive(path: Path, place: str, given: object, variable: Variable | None) -> float:
-    """Return a standard deviation, or a period, in SI; UserError unless it is above 0."""
-    known = SECONDS if variable is None else units_of(variable.unit or None, {})
+def _time(path: Path, place: str, given: object) -> float:
+    """Return a time in s; UserError unless it is a finite number."""
     try:
-        value = quantity(given, known, is_difference=True)
+        value = quantity(given, SECONDS)
+        if math.isfinite(value):
+            return value
+        raise WrongValueError(f"expected a finite number, got {show(given)}")
     except WrongValueError as error:
         raise UserError(f"{path}: {place}: {error}") from None
-    if not 0 < value < math.inf:
-        what = "a period" if variable is None else "a standard deviation"
-        raise UserError(f"{path}: {place}: expected {what} above 0, got {show(given)}")
+
+
+def _deviation(path: Path, place: str, given: object, variable: Variable) -> float:
+    """Return a standard deviation in SI; UserError unless it is above 0 and has a square."""
+    try:
+        value = quantity(given, units_of(variable.unit or None, {}), is_difference=True)
+    except WrongValueError as error:
+        raise UserError(f"{path}: {place}: {error}") from None
+    if not value > 0:
+        what = "expected a standard deviation above 0"
+        raise UserError(f"{path}: {place}: {what}, got {show(given)}")
+    if not SMALLEST <= value <= LARGEST:
+        what = f"expected a standard deviation from {SMALLEST:g} to {LARGEST:g}"
+        raise UserError(f"{path}: {place}: {what}, got {show(given)}")
     return value

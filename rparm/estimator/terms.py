@@ -9,8 +9,16 @@ from itertools import combinations_with_replacement as pairs
 
 from rparm.errors import UserError
 from rparm.estimator.request import PLANT, Request
+from rparm.fmu_tools.compiler.expressions.expression import (
+    RELATIONS,
+    Node,
+    in_order,
+    names,
+    with_names,
+)
+from rparm.fmu_tools.compiler.expressions.kinds import CONDITION
 from rparm.fmu_tools.compiler.graph.graph import Value, is_number
-from rparm.fmu_tools.compiler.read.content import Event
+from rparm.fmu_tools.compiler.read.content import CALCULATED, Event
 from rparm.fmu_tools.compiler.units import BASE, shown
 
 
@@ -73,6 +81,20 @@ class Terms:
             if variable is not None and variable.is_real:
                 is_rate = state != name or variable.leaf is None
                 yield variable.value if is_rate else variable.leaf
+
+    def relations(self, *roots: Node) -> list[Node]:
+        """Return relations that states move, also those of Boolean entries that roots name."""
+        known = {
+            v.name: v.expression.tree
+            for v in self.plant.of(*CALCULATED)
+            if v.kind == CONDITION and v.expression
+        }
+        found: list[Node] = []
+        for root in roots:
+            while names(root) & known.keys():
+                root = with_names(root, known)
+            found += [n for n in in_order([root]) if n.op in RELATIONS and self.moving(names(n))]
+        return found
 
     def moving(self, names: Iterable[str]) -> list[str]:
         """Return what is estimated and moves one of these names."""
