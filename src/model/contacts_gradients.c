@@ -38,7 +38,7 @@ void contacts_strike_gradients(const struct work *work, const double P[], const 
     double *change = call->room.gradients.contacts, *of_P = change + count;
     const struct contacts_measured along = contacts_measured_in(model, of_P + count);
     for (int j = 0; j < gradients->count; j++) {
-        double *gradient = states_of(work) + (1 + j) * gradients->state_count;
+        double *gradient = states_of(work) + (ptrdiff_t)(1 + j) * gradients->state_count;
         model->measure_along(call->values, call->t, call->du, call->room.gradients.shift, j,
                              &along);
         write_change(work, &along, P, is_struck, restitution, change);
@@ -79,7 +79,7 @@ void contacts_hold_gradients(const struct work *work) {
         work->marked[k] = work->rests[k] && work->pattern[k] == 0;
     }
     for (int j = 0; j < gradients->count; j++) {
-        double *gradient = states_of(work) + (1 + j) * gradients->state_count;
+        double *gradient = states_of(work) + (ptrdiff_t)(1 + j) * gradients->state_count;
         model->measure_along(call->values, call->t, call->du, call->room.gradients.shift, j,
                              &along);
         for (int k = 0; k < count; k++) {

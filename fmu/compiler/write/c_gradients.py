@@ -159,7 +159,8 @@ def _sums(code: Code, terms: list[Value]) -> tuple[Operand, Operand]:
     """Return the sum of terms, and of their magnitudes."""
     given = [code.of(term) for term in terms] or [0.0]
     sizes = [("fabs", code.constant(operand)) for operand in given] if terms else [0.0]
-    return (reduce(lambda a, b: ("+", a, b), of) for of in (given, sizes))
+    total, magnitude = (reduce(lambda a, b: ("+", a, b), of) for of in (given, sizes))
+    return total, magnitude
 
 
 def _ticks(events: Events) -> list[str]:
