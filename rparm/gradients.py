@@ -74,6 +74,9 @@ def gradient(
     Gradient
         `time`, `values`, `gradients` and `are_exact`; row i is after the step to time i.
     """
+    for key, names in (("of", of), ("by", by)):
+        if isinstance(names, str) or not names:
+            raise UserError(f"{key}: expected a list of names, got {names!r}")
     path = Path(model)
     if not path.suffix and not is_file(path):
         path = project.equations_of_model(project.model(str(model))) or path

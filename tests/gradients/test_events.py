@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from tests.equations.examples import METHODS, loaded
 from tests.gradients.models import EXACT, fmus, run
@@ -122,3 +123,33 @@ def test_a_ceiling_away_from_the_apex(method: str, top: float) -> None:
     v = (16 - 20 * (top - 1)) ** 0.5
     slope = 2 + 20 * (1.9 - (4 - v) / 10) / v
     assert found["h_by_top"][-1] == pytest.approx(slope, rel=1e-9)
+
+
+@EACH_METHOD
+def test_what_begins_at_its_limit(method: str) -> None:
+    """By the limit the run has two derivatives; by what does not move it, one."""
+    assert not run(fmus()["Ties"], method, 1.0, 0.25)[EXACT][0]
+    assert run(fmus()["Ties"], method, 1.0, 0.25, L=0.9)[EXACT].all()
+
+
+@EACH_METHOD
+def test_kinks_say_nothing(method: str) -> None:
+    """Both sides of abs and max are equal, also where the slope is 0 or the run begins there."""
+    assert run(fmus()["Kinks"], method, 2.0, 0.25)[EXACT].all()
+
+
+@EACH_METHOD
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-8, 1e-9])
+def test_gradients_go_on_beyond_the_end_of_a_branch(method: str, tolerance: float) -> None:
+    """Where a trial step looks at the power of a negative number: against variations by scipy."""
+
+    def rates(t: float, x: np.ndarray) -> list[float]:
+        above = max(x[0] - 1.0, 0.0)
+        slope = -3.0 * above**0.5
+        power = above**1.5
+        return [np.cos(t) - 2 * power, np.cos(t) + slope * x[1], -power + slope * x[2]]
+
+    found = run(fmus()["Weir"], method, 9.0, 0.5, tolerance=tolerance)
+    wanted = solve_ivp(rates, (0, 9), [0.5, 0, 0], "DOP853", rtol=1e-11, atol=1e-12).y[1:, -1]
+    given = [found[name][-1] for name in ("h_by_q", "h_by_w")]
+    assert given == pytest.approx(wanted, abs=100 * tolerance)

@@ -77,6 +77,8 @@ def test_models_of_the_project_and_fmus_have_gradients(file: Path) -> None:
     [
         ("decay.toml", {"of": ["y"]}, "no Real output 'y'"),
         ("decay.toml", {"by": ["start(k)"]}, "expected a state"),
+        ("decay.toml", {"by": "k"}, "by: expected a list of names, got 'k'"),
+        ("decay.toml", {"of": []}, "of: expected a list of names"),
         ("decay.toml", {"tolerance": 2.0}, "tolerance: expected"),
         ("RPManipulatr", {}, "did you mean"),
         ("none.toml", {}, "none.toml"),
