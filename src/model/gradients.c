@@ -18,23 +18,29 @@ static int *exactness_of(const struct call *call) {
     return (int *)(void *)((char *)call->values + call->model->gradients->are_exact);
 }
 
-/* Adds a cause whose shifts are those in room.by, which may be wrong by `noise` each. */
-static void add_cause(const struct call *call, const char *name, const double shift[],
+static double *shifts_of(const struct call *call, int part) {
+    return call->room.gradients.shift + (ptrdiff_t)part * call->model->gradients->count;
+}
+
+/* Adds a cause, by its place among all of them, whose shifts may be wrong by `noise` each. */
+static void add_cause(const struct call *call, int place, const char *name, const double shift[],
                       const double noise[]) {
+    const struct gradients *gradients = call->model->gradients;
     const struct gradients_room *room = &call->room.gradients;
-    struct departure *departure = room->departure;
-    const int count = call->model->gradients->count;
-    for (int j = 0; departure->cause != NULL && j < count; j++) {
-        const double difference = fabs(shift[j] - room->shift[j]);
-        if (!(difference <= noise[j] + room->noise[j])) {
-            departure->other = name;
+    const int part = gradients->part_of_cause[place];
+    double *known = shifts_of(call, part);
+    double *error = room->noise + (ptrdiff_t)part * gradients->count;
+    const char *first = room->cause[part];
+    for (int j = 0; j < gradients->count; j++) {
+        if (first == NULL) {
+            known[j] = shift[j];
+            error[j] = noise[j];
+        } else if (!(fabs(shift[j] - known[j]) <= noise[j] + error[j])) {
+            room->departure->other[0] = first;
+            room->departure->other[1] = name;
         }
     }
-    for (int j = 0; departure->cause == NULL && j < count; j++) {
-        room->shift[j] = shift[j];
-        room->noise[j] = noise[j];
-    }
-    departure->cause = departure->cause == NULL ? name : departure->cause;
+    room->cause[part] = first == NULL ? name : first;
 }
 
 static struct crossing crossing_of(const struct call *call, int relation) {
@@ -75,7 +81,7 @@ static void add_crossing(const struct call *call, const struct event *event, int
         found.by[j] = is_flat ? 0.0 : -found.by[j] / found.slope;
         found.sizes[j] = is_flat ? INFINITY : same * found.sizes[j] / fabs(found.slope);
     }
-    add_cause(call, gradients->names[relation], found.by, found.sizes);
+    add_cause(call, relation, gradients->names[relation], found.by, found.sizes);
 }
 
 /* Looks at a distance that turns before it has come to 0. */
@@ -95,7 +101,9 @@ static void add_tick(const struct call *call, int sampler) {
     for (int j = 0; j < model->gradients->count; j++) {
         noise[j] = same * fabs(shift[j]);
     }
-    add_cause(call, model->change_names[model->event_count + sampler], shift, noise);
+    const int limits = model->contacts != NULL ? 2 * model->contacts->contact_count : 0;
+    add_cause(call, model->relation_count + limits + sampler,
+              model->change_names[model->event_count + sampler], shift, noise);
 }
 
 /* Adds time events that come now. */
@@ -134,10 +142,10 @@ static void move(const struct call *call, const double rate[], double sign) {
     const struct gradients *gradients = call->model->gradients;
     const int count = gradients->state_count;
     double *gradient = states_of(call) + count;
-    for (int j = 0; j < gradients->count; j++) {
-        const double shift = sign * call->room.gradients.shift[j];
-        for (int i = 0; shift != 0.0 && i < count; i++) {
-            gradient[j * count + i] += shift * rate[i];
+    for (int i = 0; i < count; i++) {
+        const double *shift = shifts_of(call, gradients->part_of_state[i]);
+        for (int j = 0; j < gradients->count; j++) {
+            gradient[j * count + i] += shift[j] != 0.0 ? sign * shift[j] * rate[i] : 0.0;
         }
     }
 }
@@ -168,7 +176,6 @@ void gradients_depart(const struct call *call, const struct event *event) {
  * with another parameter they begin on one side or on the other. */
 static void look_at_ties(const struct call *call) {
     const struct gradients *gradients = call->model->gradients;
-    const struct gradients_room *room = &call->room.gradients;
     modes_compare(call, call->room.tolerance, call->room.compared);
     const int count = call->relation_count > 0 ? gradients->relation_count : 0;
     for (int k = 0; k < count; k++) {
@@ -177,12 +184,13 @@ static void look_at_ties(const struct call *call) {
             continue;
         }
         const struct crossing found = crossing_of(call, k);
+        const double *shift = shifts_of(call, gradients->part_of_cause[k]);
         for (int j = 0; j < gradients->count; j++) {
-            const double drift = found.drift * room->shift[j];
+            const double drift = found.drift * shift[j];
             // of the gradients before they have moved with the event, too
-            const double size = found.sizes[j] + fabs(drift) + fabs(found.slope * room->shift[j]);
+            const double size = found.sizes[j] + fabs(drift) + fabs(found.slope * shift[j]);
             if (fabs(found.by[j] + drift) > same * size) {
-                room->departure->tied = gradients->names[k];
+                call->room.gradients.departure->tied = gradients->names[k];
             }
         }
     }
@@ -207,10 +215,10 @@ static void note_doubt(const struct call *call, const struct event *event) {
                        "%.100s begins exactly at its limit, and another parameter moves it to one "
                        "side or the other",
                        departure->tied);
-    } else if (departure->other != NULL) {
+    } else if (departure->other[0] != NULL) {
         (void)snprintf(event->note, event->note_size,
                        "%.100s and %.100s come at once, and another parameter changes their order",
-                       departure->cause, departure->other);
+                       departure->other[0], departure->other[1]);
     } else {
         (void)snprintf(event->note, event->note_size,
                        "%.100s: inputs take part, and in Model Exchange their motion is not known",
@@ -242,7 +250,7 @@ void gradients_arrive(const struct call *call, const struct event *event, bool i
         jumps |= fabs(after[i] - before[i]) > no_jump * size;
     }
     const bool is_doubtful =
-        departure->doubtful != NULL || departure->other != NULL || departure->driven != NULL;
+        departure->doubtful != NULL || departure->other[0] != NULL || departure->driven != NULL;
     if (departure->missed != NULL || departure->tied != NULL || (jumps && is_doubtful)) {
         note_doubt(call, event);
     }

@@ -10,7 +10,8 @@
  * T_p follows from what has caused the event: where a relation g comes to its limit, T_p = -(g_x S
  * + g_p) / (g_x f + g_t + g_u u'); a tick's time is a function of parameters; what happens at the
  * start, or since inputs have jumped, does so at a fixed time. All that follows at the same instant
- * has the same T_p. */
+ * has the same T_p, within a part of the model that others do not read: two equal machines may
+ * switch at once, each at its own time. */
 #pragma once
 
 #include "model.h"
@@ -32,6 +33,9 @@ struct gradients {
     int count;                /* of parameters */
     int state_count;          /* of the model without gradients, which come first */
     size_t are_exact;         /* offset of an int */
+    int part_count;           /* of parts that do not read each other */
+    const int *part_of_state; /* number of the part */
+    const int *part_of_cause; /* likewise of relations, limits of contacts, samplers */
     const double *size;       /* of a change of each parameter that is not small */
     const char *const *names; /* of relations, then of the limits of contacts */
     int relation_count;       /* those of the model; behind them slopes are compared with 0 */
@@ -56,8 +60,7 @@ struct gradients {
 struct departure {
     bool has_departed;
     bool jumps;           /* true if the event has assigned something */
-    const char *cause;    /* the first one; NULL: none yet */
-    const char *other;    /* one at the same instant whose time changes in another way */
+    const char *other[2]; /* two at once in a part, whose times change in different ways */
     const char *doubtful; /* one that another parameter would let vanish */
     const char *missed;   /* one that another parameter would let happen */
     const char *tied;     /* one that begins at its limit, and another parameter would not */
@@ -66,18 +69,20 @@ struct departure {
 
 /* Memory for one call. */
 struct gradients_room {
-    double *shift;    /* T_p of each parameter, s by its unit */
-    double *noise;    /* of each shift */
-    double *rate;     /* two per state */
-    double *by;       /* two per parameter */
-    double *contacts; /* what is measured of them, and two per direction */
+    double *shift;      /* of each part: T_p of each parameter, s by its unit */
+    double *noise;      /* of each shift */
+    double *rate;       /* two per state */
+    double *by;         /* two per parameter */
+    double *contacts;   /* what is measured of them, and two per direction */
+    const char **cause; /* of each part: the first one; NULL: none yet */
     struct departure *departure;
 };
 
-#define GRADIENTS_ROOM(parameters, states, of_contacts)                                            \
+#define GRADIENTS_ROOM(parameters, states, parts, of_contacts)                                     \
     (struct gradients_room) {                                                                      \
-        (double[parameters]){0}, (double[parameters]){0}, (double[2 * (states) + 1]){0},           \
-            (double[2 * (parameters)]){0}, (double[(of_contacts) + 1]){0}, &(struct departure) {   \
+        (double[(parts) * (parameters)]){0}, (double[(parts) * (parameters)]){0},                  \
+            (double[2 * (states) + 1]){0}, (double[2 * (parameters)]){0},                          \
+            (double[(of_contacts) + 1]){0}, (const char *[parts]){NULL}, &(struct departure) {     \
             0                                                                                      \
         }                                                                                          \
     }

@@ -153,3 +153,13 @@ def test_gradients_go_on_beyond_the_end_of_a_branch(method: str, tolerance: floa
     wanted = solve_ivp(rates, (0, 9), [0.5, 0, 0], "DOP853", rtol=1e-11, atol=1e-12).y[1:, -1]
     given = [found[name][-1] for name in ("h_by_q", "h_by_w")]
     assert given == pytest.approx(wanted, abs=100 * tolerance)
+
+
+@EACH_METHOD
+def test_parts_that_switch_at_once_each_move_at_their_own_time(method: str) -> None:
+    """Two balls that know nothing of each other: only the first one's start moves it."""
+    found = run(fmus()["Twins"], method, 1.9, 0.1)
+    assert found[EXACT].all()
+    assert found["h1_by_e"] == pytest.approx(found["h2_by_e"], abs=1e-12)
+    assert found["v1_by_start_v1"][-1] == pytest.approx(1.0, abs=1e-9)
+    assert not found["v2_by_start_v1"].any() and not found["h2_by_start_v1"].any()

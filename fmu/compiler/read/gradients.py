@@ -24,6 +24,7 @@ from .content import (
     COUNTS,
     FOLLOWS,
     OPTIONS,
+    Change,
     Expression,
     ModelFile,
     ModelFileError,
@@ -37,6 +38,7 @@ START = re.compile(r"start\(\s*(.+?)\s*\)")
 OF_IMPACTS = ("impulse", "impulses", "loss")  # of stops
 STEPS = {"floor", "ceil", "round", "sign"}
 CONTINUOUS = ("abs", "min", "max")  # switch where both branches are equal
+CHANGING = ("state", "discrete", "mode", "integer")
 SHIFT = "shift"  # leaf: derivative of the time of an event
 
 
@@ -71,19 +73,23 @@ class Gradients:
     # relations of slopes with 0, and the relations whose distances have these slopes
     watched: dict[str, str] = field(default_factory=dict)
     relations: int = 0  # of the file; those of slopes follow
+    parts: dict[tuple[str, str], int] = field(default_factory=dict)  # by leaves
     kinks: set[str] = field(default_factory=set)  # relations where both branches are equal
 
     def seeds(
-        self, graph: Graph, i: int, at_event: Iterable[Value] | None = None
+        self, graph: Graph, i: int, at_event: Iterable[Value] | None = None, part: int = 0
     ) -> dict[Value, Value]:
-        """Return derivatives of all leaves by one of `by`; at_event: inputs, which move there."""
+        """Return derivatives of all leaves by one of `by`.
+
+        at_event: inputs, which move there; part: in which the event is.
+        """
         given = self.by[i]
         found = {leaf: slopes[i] for leaf, slopes in (self.states | self.discrete).items()}
         if not given.is_start:
             found[given.variable.leaf] = graph.number(1.0)
         if at_event is None:
             return found
-        shift = graph.value(SHIFT, name=given.name)
+        shift = graph.value(SHIFT, name=f"{part} {given.name}")
         found |= {graph.value(op): shift for op in ("time", "later")}
         return found | {
             u: graph.value("*", graph.value("first", name=u.name), shift) for u in at_event
@@ -174,6 +180,7 @@ def add(file: ModelFile) -> None:
             places[variable.leaf].append(made.leaf)
     outputs = [v for v in file.of(*CALCULATED) if v.is_real and _is_wanted(gradients, v)]
     inputs = [u.leaf for u in file.of("inputs")]
+    gradients.parts = _parts(file)
     slopes = Slopes(graph)
     for i, by in enumerate(gradients.by):
         seeds = gradients.seeds(graph, i)
@@ -192,8 +199,8 @@ def add(file: ModelFile) -> None:
                 made = file.variables[_name(variable, by)]
                 (value,) = graph.derivatives([variable.initial.value], seeds)
                 made.initial = _expression(made, value, f"derivative of the start by {by.shown}")
-        at_event = gradients.seeds(graph, i, inputs)
         for change in file.changes:
+            at_event = gradients.seeds(graph, i, inputs, part_of_change(file, change))
             targets = [name for name in change.given if file.variables.get(name) in moved]
             new = graph.derivatives([change.given[name].value for name in targets], at_event)
             for name, value in zip(targets, new, strict=True):
@@ -202,6 +209,70 @@ def add(file: ModelFile) -> None:
                 change.gradients[made.name] = _expression(made, value, text)
     _add_flag(file)
     _watch(file)
+
+
+def _parts(file: ModelFile) -> dict[tuple[str, str], int]:
+    """Return numbers of parts that do not read each other, by what changes in them."""
+    graph, above = file.graph, {}
+
+    def top(leaf: tuple[str, str]) -> tuple[str, str]:
+        while above.setdefault(leaf, leaf) != leaf:
+            leaf = above[leaf]
+        return leaf
+
+    def join(leaves: Iterable[tuple[str, str]]) -> None:
+        found = [leaf for leaf in leaves if leaf[0] in CHANGING]
+        for leaf in found:
+            above[top(leaf)] = top(found[0])
+
+    for x in [x for x in file.of("states") if x.leaf in file.gradients.states]:
+        join([(x.leaf.op, x.name), *x.value.leaves])
+    for relation in graph.relations.values():
+        join([(relation.mode.op, relation.name), *relation.distance.leaves])
+    for segment in graph.segments.values():
+        modes = ((of.mode.op, of.name) for of in (segment.low, segment.high))
+        join([(segment.leaf.op, segment.leaf.name), *segment.argument.leaves, *modes])
+    for change in file.changes:
+        values = [e.value for e in (*change.conditions, *change.given.values())]
+        join([*_targets(file, change), *(leaf for value in values for leaf in value.leaves)])
+    join(leaf for value in _of_contacts(file) for leaf in value.leaves)
+    numbers: dict[tuple[str, str], int] = {}
+    return {leaf: numbers.setdefault(top(leaf), len(numbers)) for leaf in [*above]}
+
+
+def _of_contacts(file: ModelFile) -> Iterator[Value]:
+    """Yield what decides friction and stops: they are one part."""
+    found = file.graph.contacts
+    if found is not None:
+        yield from found.accelerations
+        for row in (*found.response, *found.moved.values()):
+            yield from row
+        for limit in found.limits:
+            yield from (case for case in (*limit.cases, limit.used) if case is not None)
+        for contact in file.contacts:
+            yield file.variables[contact.variable("mode")].leaf
+            yield from (e.value for e in contact.given.values())
+
+
+def _targets(file: ModelFile, change: Change) -> list[tuple[str, str]]:
+    """Return the leaves that an event or a sampler changes."""
+    named = [file.variables.get(name) for name in change.given]
+    return [
+        (variable.leaf.op, name) if variable else ("mode", name)
+        for name, variable in zip(change.given, named, strict=True)
+    ]
+
+
+def part_of_change(file: ModelFile, change: Change) -> int:
+    """Return the part in which an event or a sampler is."""
+    found = [file.gradients.parts[leaf] for leaf in _targets(file, change)]
+    return found[0] if found else 0
+
+
+def part_of(file: ModelFile, leaves: Iterable[tuple[str, str]]) -> int:
+    """Return the part in which one of these leaves is; 0 if there is none."""
+    parts = file.gradients.parts
+    return next((parts[leaf] for leaf in sorted(leaves) if leaf in parts), 0)
 
 
 def _watch(file: ModelFile) -> None:

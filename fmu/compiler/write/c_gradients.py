@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..graph.graph import Value
 from ..read.content import ModelFile
-from ..read.gradients import ARE_EXACT
+from ..read.gradients import ARE_EXACT, part_of, part_of_change
 from . import c_contacts
 from .c_code import Code, Leaves
 from .c_text import filled, indented, text
@@ -30,6 +30,9 @@ def parts(events: Events, in_domain: str) -> dict[str, object]:
     by, states = file.gradients.by, [*file.gradients.states]
     names = [*file.graph.relations]
     limits = [f"{limit.contact}.{limit.key}" for limit in events.limits]
+    causes = [part_of(file, [(r.mode.op, r.name)]) for r in events.relations]
+    causes += [part_of(file, c_contacts.distance(file, x).leaves) for x in events.limits]
+    causes += [part_of_change(file, sampler) for sampler in file.sampled]
     distances = [relation.distance for relation in events.relations]
     distances += [c_contacts.distance(file, limit) for limit in events.limits]
     watched = [names.index(file.gradients.watched[r]) if r in file.gradients.watched else -1
@@ -48,6 +51,9 @@ def parts(events: Events, in_domain: str) -> dict[str, object]:
                    for line in _crossing(events, i, distance)],
         ticks=_ticks(events),
         count=len(by),
+        parts=1 + max(file.gradients.parts.values(), default=0),
+        of_states=", ".join(str(part_of(file, [(x.op, x.name)])) for x in states) or "0",
+        of_causes=", ".join(map(str, causes)) or "0",
         states=len(states),
         are_exact=file.fields.count(ARE_EXACT),
     )  # fmt: skip
@@ -57,13 +63,14 @@ def parts(events: Events, in_domain: str) -> dict[str, object]:
         if contacts
         else []
     )
-    of_contacts = "0"
+    of_contacts, parts_of = "0", 1 + max(file.gradients.parts.values(), default=0)
     if contacts:
         of_contacts = f"CONTACTS_MEASURED({', '.join(map(str, counts))}) + {2 * counts[0]}"
+    room = len(by), len(states), parts_of, of_contacts
     return {
         "gradients": found.splitlines(),
         "of_gradients": [".gradients = &gradients,"],
-        "room_of_gradients": f", GRADIENTS_ROOM({len(by)}, {len(states)}, {of_contacts})",
+        "room_of_gradients": f", GRADIENTS_ROOM({', '.join(map(str, room))})",
     }
 
 
@@ -79,7 +86,12 @@ def shifts(file: ModelFile) -> dict[tuple[str, str], Operand]:
         ("first", u.name): Place("du[", i, "]") for i, u in enumerate(file.of("inputs"))
     }
     by = file.gradients.by if file.gradients else ()
-    return moving | {("shift", given.name): Place("shift[", j, "]") for j, given in enumerate(by)}
+    parts = range(1 + max(file.gradients.parts.values(), default=0)) if by else ()
+    return moving | {
+        ("shift", f"{part} {given.name}"): Place("shift[", part * len(by) + j, "]")
+        for part in parts
+        for j, given in enumerate(by)
+    }
 
 
 def along(file: ModelFile, leaves: Leaves) -> dict[str, list[str]]:
@@ -98,8 +110,9 @@ def along(file: ModelFile, leaves: Leaves) -> dict[str, list[str]]:
         keys = [key for key in ("ratio", "restitution", "at_lower", "at_upper") if key in own]
         values |= {Place(f"to->{key}[", e, "]"): own[key] for key in keys}
     lines, inputs = [], [u.leaf for u in file.of("inputs")]
+    part = part_of(file, [(d.own.op, d.own.name) for d in found.directions])
     for j in range(len(gradients.by)):
-        slopes = graph.derivatives(values.values(), gradients.seeds(graph, j, inputs))
+        slopes = graph.derivatives(values.values(), gradients.seeds(graph, j, inputs, part))
         code = Code(leaves.but(shifts(file)))
         code.assign(dict(zip(values, slopes, strict=True)))
         lines += [f"if (parameter == {j}) {{", *indented(code.lines()), "}"]
