@@ -185,7 +185,7 @@ static enum status setup(struct instance *instance) {
         return STATUS_OK;
     }
     instance->ode.state_count = count_of(model->states);
-    instance->ode.gradient_count = model->gradient_count;
+    instance->ode.gradient_count = (unsigned)model->gradient_count;
     instance->ode.rhs = instance_rhs;
     instance->ode.jacobian = instance_jacobian;
     instance->ode.band = model->band;

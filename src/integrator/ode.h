@@ -49,8 +49,8 @@ struct ode {
     size_t series_row_count;   /* >= state_count if there is a series */
     ode_settle *settle;        /* called after some internal steps; NULL if nothing depends on it */
     bool may_end; /* true if solutions may end: then a method does not creep up to such an end */
-    size_t gradient_count; /* copies of the states behind them, as in struct model */
-    size_t state_count;    /* > 0, with all copies */
+    unsigned gradient_count; /* copies of the states behind them, as in struct model */
+    size_t state_count;      /* > 0, with all copies */
     void *context;
 };
 

@@ -220,7 +220,7 @@ static enum status decay_series(double t, double time_scale, int first, int last
 
 static struct ode decay_of(size_t *count) {
     return (struct ode){.state_count = *count,
-                        .gradient_count = gradients,
+                        .gradient_count = (unsigned)gradients,
                         .rhs = decay,
                         .jacobian = decay_jacobian,
                         .series = decay_series,
