@@ -201,11 +201,11 @@ static void note_doubt(const struct call *call, const struct event *event) {
     const struct departure *departure = call->room.gradients.departure;
     const char *touched = departure->missed != NULL ? departure->missed : departure->doubtful;
     int *are_exact = exactness_of(call);
-    if (!*are_exact || event->note == NULL) {
-        *are_exact = 0;
+    const bool were_exact = *are_exact != 0;
+    *are_exact = 0;
+    if (!were_exact || event->note == NULL) {
         return;
     }
-    *are_exact = 0;
     if (touched != NULL) {
         (void)snprintf(event->note, event->note_size,
                        "%.100s: it is only touched, and another parameter may let it happen or not",

@@ -33,8 +33,7 @@ struct gradients {
     int count;                /* of parameters */
     int state_count;          /* of the model without gradients, which come first */
     size_t are_exact;         /* offset of an int */
-    int part_count;           /* of parts that do not read each other */
-    const int *part_of_state; /* number of the part */
+    const int *part_of_state; /* number of the part, of those that do not read each other */
     const int *part_of_cause; /* likewise of relations, limits of contacts, samplers */
     const double *size;       /* of a change of each parameter that is not small */
     const char *const *names; /* of relations, then of the limits of contacts */

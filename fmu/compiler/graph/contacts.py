@@ -85,6 +85,11 @@ class Limit:
     cases: tuple[Value | None, Value, Value]  # condition, distance if it holds, else
     most: Value | None = None  # of friction: the largest force that holds, in the first case
 
+    def distance(self, graph: Graph) -> Value:
+        """Return the distance in the modes that are."""
+        condition, first, second = self.cases
+        return second if condition is None else graph.value("if", condition, first, second)
+
 
 @dataclass(eq=False)
 class Contacts:
@@ -608,6 +613,19 @@ class Builder:
         if b.op == "number" and b.number == -1.0:
             return self.graph.negative(a)
         return self.graph.simple("/", a, b)
+
+
+def deciding(graph: Graph) -> list[Value]:
+    """Return all that decides contacts."""
+    found = graph.contacts
+    if found is None:
+        return []
+    values = [*found.accelerations, *(v for row in found.response for v in row)]
+    values += [v for row in found.moved.values() for v in row]
+    values += [v for contact in found.contacts for v in contact.given.values()]
+    for limit in found.limits:
+        values += [limit.distance(graph), *([] if limit.used is None else [limit.used])]
+    return values
 
 
 def is_mode(graph: Graph, contact: Contact, mode: int) -> Value:

@@ -1,9 +1,8 @@
 """Derivatives along many directions, with few operations for each.
 
 Where all that moves a value does so by way of one other value, the derivative by that one is
-calculated once, and times its derivative along each direction: the nearest common dominator of
-Lengauer and Tarjan, A Fast Algorithm for Finding Dominators in a Flowgraph (1979), of a graph
-without cycles.
+calculated once, and multiplied by its derivative along each direction. That other value dominates
+the first one: Lengauer and Tarjan, A Fast Algorithm for Finding Dominators in a Flowgraph (1979).
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from typing import Any
 from ..expressions.expression import RELATIONS, Node, in_order
 from ..expressions.hints import meant
 from ..expressions.kinds import CONDITION
+from ..graph.contacts import deciding
 from ..graph.dominators import Slopes
 from ..graph.graph import Graph, Value
 from ..units import Exponents
@@ -75,6 +76,11 @@ class Gradients:
     relations: int = 0  # of the file; those of slopes follow
     parts: dict[tuple[str, str], int] = field(default_factory=dict)  # by leaves
     kinks: set[str] = field(default_factory=set)  # relations where both branches are equal
+
+    @property
+    def part_count(self) -> int:
+        """The number of parts."""
+        return 1 + max(self.parts.values(), default=0)
 
     def seeds(
         self, graph: Graph, i: int, at_event: Iterable[Value] | None = None, part: int = 0
@@ -165,50 +171,62 @@ def warnings(file: ModelFile) -> Iterator[str]:
 
 def add(file: ModelFile) -> None:
     """Add the variables to a file whose expressions have their values."""
-    gradients, graph = file.gradients, file.graph
+    gradients, slopes = file.gradients, Slopes(file.graph)
     of_stops = {c.variable(key) for c in file.contacts for key in OF_IMPACTS}
     moved = [v for v in file.of("states", "discrete") if v.name not in of_stops]
-    for variable in moved:
-        places = gradients.states if variable.section == "states" else gradients.discrete
-        places[variable.leaf] = []
-    for by in gradients.by:  # states of one parameter stand together
-        for variable in moved:
-            made = _variable(file, variable, by, variable.section)
-            made.leaf = graph.value(variable.leaf.op, name=made.name)
-            made.start = 1.0 if by.is_start and by.variable is variable else 0.0
-            places = gradients.states if variable.section == "states" else gradients.discrete
-            places[variable.leaf].append(made.leaf)
     outputs = [v for v in file.of(*CALCULATED) if v.is_real and _is_wanted(gradients, v)]
-    inputs = [u.leaf for u in file.of("inputs")]
+    _declare(file, moved)
     gradients.parts = _parts(file)
-    slopes = Slopes(graph)
-    for i, by in enumerate(gradients.by):
-        seeds = gradients.seeds(graph, i)
-        rates = slopes.along([x.value for x in file.of("states") if x in moved], seeds)
-        for x, rate in zip([v for v in moved if v.section == "states"], rates, strict=True):
-            made = file.variables[_name(x, by)]
-            made.expression = _expression(made, rate, f"derivative of d{x.name}/dt by {by.shown}")
-        values = graph.derivatives([v.value for v in outputs], seeds)
-        for variable, value in zip(outputs, values, strict=True):
-            made = _variable(file, variable, by, "outputs")
-            made.expression = _expression(
-                made, value, f"derivative of {variable.name} by {by.shown}"
-            )
-        for variable in moved:
-            if variable.initial is not None:
-                made = file.variables[_name(variable, by)]
-                (value,) = graph.derivatives([variable.initial.value], seeds)
-                made.initial = _expression(made, value, f"derivative of the start by {by.shown}")
-        for change in file.changes:
-            at_event = gradients.seeds(graph, i, inputs, part_of_change(file, change))
-            targets = [name for name in change.given if file.variables.get(name) in moved]
-            new = graph.derivatives([change.given[name].value for name in targets], at_event)
-            for name, value in zip(targets, new, strict=True):
-                made = file.variables[_name(file.variables[name], by)]
-                text = f"derivative of {name} by {by.shown}"
-                change.gradients[made.name] = _expression(made, value, text)
+    for i in range(len(gradients.by)):
+        _derive(file, moved, outputs, slopes, i)
+        _derive_changes(file, moved, i)
     _add_flag(file)
     _watch(file)
+
+
+def _declare(file: ModelFile, moved: list[Variable]) -> None:
+    """Declare the gradients of states and discrete variables; those of one parameter together."""
+    places = {"states": file.gradients.states, "discrete": file.gradients.discrete}
+    for by in file.gradients.by:
+        for variable in moved:
+            made = _variable(file, variable, by, variable.section)
+            made.leaf = file.graph.value(variable.leaf.op, name=made.name)
+            made.start = 1.0 if by.is_start and by.variable is variable else 0.0
+            places[variable.section].setdefault(variable.leaf, []).append(made.leaf)
+
+
+def _derive(
+    file: ModelFile, moved: list[Variable], outputs: list[Variable], slopes: Slopes, i: int
+) -> None:
+    """Derive rates, outputs and starts by one of the parameters."""
+    graph, by, seeds = file.graph, file.gradients.by[i], file.gradients.seeds(file.graph, i)
+    states = [v for v in moved if v.section == "states"]
+    for x, rate in zip(states, slopes.along([x.value for x in states], seeds), strict=True):
+        made = file.variables[_name(x, by)]
+        made.expression = _expression(made, rate, f"derivative of d{x.name}/dt by {by.shown}")
+    values = graph.derivatives([v.value for v in outputs], seeds)
+    for variable, value in zip(outputs, values, strict=True):
+        made = _variable(file, variable, by, "outputs")
+        made.expression = _expression(made, value, f"derivative of {variable.name} by {by.shown}")
+    for variable in moved:
+        if variable.initial is not None:
+            made = file.variables[_name(variable, by)]
+            (value,) = graph.derivatives([variable.initial.value], seeds)
+            made.initial = _expression(made, value, f"derivative of the start by {by.shown}")
+
+
+def _derive_changes(file: ModelFile, moved: list[Variable], i: int) -> None:
+    """Derive the new values of events and samplers by one of the parameters."""
+    graph, by = file.graph, file.gradients.by[i]
+    inputs = [u.leaf for u in file.of("inputs")]
+    for change in file.changes:
+        seeds = file.gradients.seeds(graph, i, inputs, part_of_change(file, change))
+        targets = [name for name in change.given if file.variables.get(name) in moved]
+        new = graph.derivatives([change.given[name].value for name in targets], seeds)
+        for name, value in zip(targets, new, strict=True):
+            made = file.variables[_name(file.variables[name], by)]
+            text = f"derivative of {name} by {by.shown}"
+            change.gradients[made.name] = _expression(made, value, text)
 
 
 def _parts(file: ModelFile) -> dict[tuple[str, str], int]:
@@ -235,38 +253,21 @@ def _parts(file: ModelFile) -> dict[tuple[str, str], int]:
     for change in file.changes:
         values = [e.value for e in (*change.conditions, *change.given.values())]
         join([*_targets(file, change), *(leaf for value in values for leaf in value.leaves)])
-    join(leaf for value in _of_contacts(file) for leaf in value.leaves)
+    modes = [contact.mode for contact in graph.contacts.contacts] if graph.contacts else []
+    join(leaf for value in [*deciding(graph), *modes] for leaf in value.leaves)  # one part
     numbers: dict[tuple[str, str], int] = {}
     return {leaf: numbers.setdefault(top(leaf), len(numbers)) for leaf in [*above]}
 
 
-def _of_contacts(file: ModelFile) -> Iterator[Value]:
-    """Yield what decides friction and stops: they are one part."""
-    found = file.graph.contacts
-    if found is not None:
-        yield from found.accelerations
-        for row in (*found.response, *found.moved.values()):
-            yield from row
-        for limit in found.limits:
-            yield from (case for case in (*limit.cases, limit.used) if case is not None)
-        for contact in file.contacts:
-            yield file.variables[contact.variable("mode")].leaf
-            yield from (e.value for e in contact.given.values())
-
-
 def _targets(file: ModelFile, change: Change) -> list[tuple[str, str]]:
     """Return the leaves that an event or a sampler changes."""
-    named = [file.variables.get(name) for name in change.given]
-    return [
-        (variable.leaf.op, name) if variable else ("mode", name)
-        for name, variable in zip(change.given, named, strict=True)
-    ]
+    variables = file.variables  # modes have no leaf there
+    return [(variables[x].leaf.op if x in variables else "mode", x) for x in change.given]
 
 
 def part_of_change(file: ModelFile, change: Change) -> int:
     """Return the part in which an event or a sampler is."""
-    found = [file.gradients.parts[leaf] for leaf in _targets(file, change)]
-    return found[0] if found else 0
+    return part_of(file, _targets(file, change)[:1])
 
 
 def part_of(file: ModelFile, leaves: Iterable[tuple[str, str]]) -> int:

@@ -100,32 +100,12 @@ def surely_held(file: ModelFile, leaves: Leaves) -> list[Item]:
     return found
 
 
-def distance(file: ModelFile, limit: Limit) -> Value:
-    """Return the distance of a limit in the modes that are."""
-    graph = file.graph
-    condition, first, second = limit.cases
-    return second if condition is None else graph.value("if", condition, first, second)
-
-
 def indicator(file: ModelFile, limit: Limit) -> Value:
     """Return the distance of a limit, or 1."""
-    found = distance(file, limit)
+    found = limit.distance(file.graph)
     return found if limit.used is None else file.graph.value(
         "if", limit.used, found, file.graph.number(1.0)
     )  # fmt: skip
-
-
-def read(file: ModelFile) -> list[Value]:
-    """Return all that decides contacts."""
-    found = file.graph.contacts
-    if found is None:
-        return []
-    values = [*found.accelerations, *(v for row in found.response for v in row)]
-    values += [v for row in found.moved.values() for v in row]
-    values += [v for contact in found.contacts for v in contact.given.values()]
-    for limit in found.limits:
-        values += [distance(file, limit), *([] if limit.used is None else [limit.used])]
-    return values
 
 
 def compare(
@@ -134,7 +114,7 @@ def compare(
     """Return statements that compare the limits; slopes: their derivatives by the time."""
     stores = []
     for i, (limit, slope) in enumerate(zip(limits(file), slopes, strict=True)):
-        found = distance(file, limit)
+        found = limit.distance(file.graph)
         entries = {
             "distance": code.of(found),
             "slope": code.of(slope),

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from ..expressions.expression import in_order
 from ..expressions.kinds import CONDITION, WHOLE, Kind
+from ..graph.contacts import deciding
 from ..graph.graph import CONDITIONS, Graph, Relation, Value, is_unknown
 from ..names import Field, c_name
 from ..plain_c.values import Conditions
@@ -169,7 +170,7 @@ class Events:
         for event in file.events:
             during = event.during and event.during.value
             read += [(event.when.value, during), *([(during, None)] if during else [])]
-        used = _guards(graph, [*read, *((value, None) for value in c_contacts.read(file))])
+        used = _guards(graph, [*read, *((value, None) for value in deciding(file.graph))])
         self.limits = c_contacts.limits(file)
         # condition under which each matters; None: always
         readers = {r.name: r.mode for r in self.relations}
@@ -206,7 +207,7 @@ class Events:
     def followed(self) -> list[Value]:
         """Distances of relations and limits, with the signs of modes."""
         relations = [self.signed(relation) for relation in self.located]
-        return relations + [c_contacts.distance(self.file, limit) for limit in self.limits]
+        return relations + [limit.distance(self.file.graph) for limit in self.limits]
 
     def signed(self, relation: Relation) -> Value:
         """The distance, with the sign of the mode."""
@@ -441,7 +442,7 @@ class Events:
 
     def _compare_limits(self) -> list[str]:
         code, errors, motion = self._comparing()
-        distances = [c_contacts.distance(self.file, limit) for limit in self.limits]
+        distances = [limit.distance(self.file.graph) for limit in self.limits]
         slopes = self.graph.derivatives(distances, motion)
         code.statements += c_contacts.compare(self.file, code, errors, slopes)
         return code.lines()

@@ -31,10 +31,10 @@ def parts(events: Events, in_domain: str) -> dict[str, object]:
     names = [*file.graph.relations]
     limits = [f"{limit.contact}.{limit.key}" for limit in events.limits]
     causes = [part_of(file, [(r.mode.op, r.name)]) for r in events.relations]
-    causes += [part_of(file, c_contacts.distance(file, x).leaves) for x in events.limits]
+    causes += [part_of(file, x.distance(file.graph).leaves) for x in events.limits]
     causes += [part_of_change(file, sampler) for sampler in file.sampled]
     distances = [relation.distance for relation in events.relations]
-    distances += [c_contacts.distance(file, limit) for limit in events.limits]
+    distances += [limit.distance(file.graph) for limit in events.limits]
     watched = [names.index(file.gradients.watched[r]) if r in file.gradients.watched else -1
                for r in names]  # fmt: skip
     found = filled(
@@ -51,7 +51,6 @@ def parts(events: Events, in_domain: str) -> dict[str, object]:
                    for line in _crossing(events, i, distance)],
         ticks=_ticks(events),
         count=len(by),
-        parts=1 + max(file.gradients.parts.values(), default=0),
         of_states=", ".join(str(part_of(file, [(x.op, x.name)])) for x in states) or "0",
         of_causes=", ".join(map(str, causes)) or "0",
         states=len(states),
@@ -63,10 +62,10 @@ def parts(events: Events, in_domain: str) -> dict[str, object]:
         if contacts
         else []
     )
-    of_contacts, parts_of = "0", 1 + max(file.gradients.parts.values(), default=0)
+    of_contacts = "0"
     if contacts:
         of_contacts = f"CONTACTS_MEASURED({', '.join(map(str, counts))}) + {2 * counts[0]}"
-    room = len(by), len(states), parts_of, of_contacts
+    room = len(by), len(states), file.gradients.part_count, of_contacts
     return {
         "gradients": found.splitlines(),
         "of_gradients": [".gradients = &gradients,"],
@@ -86,7 +85,7 @@ def shifts(file: ModelFile) -> dict[tuple[str, str], Operand]:
         ("first", u.name): Place("du[", i, "]") for i, u in enumerate(file.of("inputs"))
     }
     by = file.gradients.by if file.gradients else ()
-    parts = range(1 + max(file.gradients.parts.values(), default=0)) if by else ()
+    parts = range(file.gradients.part_count) if by else ()
     return moving | {
         ("shift", f"{part} {given.name}"): Place("shift[", part * len(by) + j, "]")
         for part in parts

@@ -9,6 +9,7 @@ from typing import Any
 from .. import interface
 from ..expressions.expression import in_order
 from ..expressions.kinds import CONDITION, WHOLE
+from ..graph.contacts import deciding
 from ..graph.graph import MOVING, Value
 from ..interface import Declaration, Display
 from ..names import Field
@@ -83,7 +84,7 @@ def _indicators(file: ModelFile) -> dict[str, Value]:
         found[name] = relation.distance
     limits = c_contacts.limits(file)
     return found | {
-        variable_of(limit.contact, limit.key): c_contacts.distance(file, limit) for limit in limits
+        variable_of(limit.contact, limit.key): limit.distance(file.graph) for limit in limits
     }
 
 
@@ -411,7 +412,7 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
     of_contacts = {c.variable(key) for c in file.contacts for key in ("mode", "impulse", "loss")}
     if "state" in changed:
         of_contacts |= {x.name for x in _moved(file)}
-    deciding = [leaf for value in c_contacts.read(file) for leaf in value.leaves]
+    of_all = [leaf for value in deciding(file.graph) for leaf in value.leaves]
     while todo:
         leaf = todo.pop()
         if leaf in found:
@@ -428,7 +429,7 @@ def _reached(leaves: Iterable[Leaf], file: ModelFile, changed: Collection[str]) 
             is_any = "state" in changed and not (op == "state" and given)
             todo += _all_known(file) - found if is_any else ()
         if name in of_contacts:
-            todo += deciding
+            todo += of_all
         if "state" in changed:
             initial = file.variables[name].initial if name in file.variables else None
             todo += initial.value.leaves if initial is not None else ()
