@@ -37,13 +37,13 @@ endfunction()
 set(platform_targets "")
 set(platform_builds "")
 foreach(platform IN LISTS RELEASE_PLATFORMS)
-  add_platform(${platform} libraries runtime)
+  add_platform(${platform} libraries runtime loop)
   list(APPEND platform_targets platform_${platform})
   list(APPEND platform_builds ${PROJECT_BINARY_DIR}/platforms/${platform})
 endforeach()
 
-# library_of(platform below name result): the shared object of an FMU for a platform.
-function(library_of platform below name result)
+# suffix_of(platform result): of shared objects.
+function(suffix_of platform result)
   if(platform MATCHES windows)
     set(suffix .dll)
   elseif(platform MATCHES darwin)
@@ -51,6 +51,12 @@ function(library_of platform below name result)
   else()
     set(suffix .so)
   endif()
+  set(${result} ${suffix} PARENT_SCOPE)
+endfunction()
+
+# library_of(platform below name result): the shared object of an FMU for a platform.
+function(library_of platform below name result)
+  suffix_of(${platform} suffix)
   set(${result} ${PROJECT_BINARY_DIR}/platforms/${platform}/fmu/${name}/${below}${name}${suffix} PARENT_SCOPE)
 endfunction()
 
@@ -124,7 +130,20 @@ function(add_release)
     COMMENT "Packing what is built for all platforms"
     VERBATIM)
   list(APPEND files ${built})
-  add_custom_target(release_files DEPENDS ${targets} ${files})
+
+  # the loop that rparm steps FMUs by, for the wheel
+  set(loops "")
+  foreach(platform IN LISTS RELEASE_PLATFORMS)
+    suffix_of(${platform} suffix)
+    set(loop ${RELEASE_FOLDER}/loop/${platform}/loop${suffix})
+    add_custom_command(
+      OUTPUT ${loop}
+      COMMAND ${CMAKE_COMMAND} -E copy ${PROJECT_BINARY_DIR}/platforms/${platform}/loop/loop${suffix} ${loop}
+      DEPENDS ${platform_targets}
+      VERBATIM)
+    list(APPEND loops ${loop})
+  endforeach()
+  add_custom_target(release_files DEPENDS ${targets} ${files} ${loops})
 
   set(wheel ${RELEASE_FOLDER}/rparm-${PROJECT_VERSION}-py3-none-any.whl)
   file(GLOB_RECURSE packaged CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/rparm/* ${PROJECT_SOURCE_DIR}/models/*
@@ -136,7 +155,7 @@ function(add_release)
     COMMAND ${CMAKE_COMMAND} -E env RPARM_RELEASE=${RELEASE_FOLDER}
             ${Python3_EXECUTABLE} -m hatchling build -t wheel -d ${RELEASE_FOLDER}
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
-    DEPENDS ${targets} ${files} ${packaged} ${PROJECT_SOURCE_DIR}/pyproject.toml
+    DEPENDS ${targets} ${files} ${loops} ${packaged} ${PROJECT_SOURCE_DIR}/pyproject.toml
             ${PROJECT_SOURCE_DIR}/README.md
     COMMENT "Packing the wheel"
     VERBATIM)

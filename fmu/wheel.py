@@ -4,6 +4,7 @@ models/                    scenarios, references, campaigns, systems and their m
                            .csv.xz, which `rparm.files` reads like .csv
 fmu/, src/                 what makes FMUs of own equations: Python, and what it reads
 pieces, files.json.xz      all FMUs and systems of the release, as `rparm.shipped` reads them
+loop/PLATFORM/             the library that rparm steps FMUs by
 built.tar.xz               what else is built for each platform: built.py
 plotly/                    the library that draws on pages
 
@@ -62,6 +63,7 @@ class CustomBuildHook(BuildHookInterface):
             include[str(root / page)] = f"{SHARE}/{page}"
         write_pieces(release, staging)
         shutil.copy(release / "built.tar.xz", staging)
+        shutil.copytree(release / "loop", staging / "loop")
         _add_plotly(root, staging)
         for file in sorted(path for path in staging.rglob("*") if path.is_file()):
             include[str(file)] = f"{SHARE}/{file.relative_to(staging).as_posix()}"

@@ -171,9 +171,6 @@ def simulate(
 ) -> Table:
     """Run an FMU for co-simulation, of FMI 2.0 or 3.0.
 
-    Where numba is installed, a compiled loop makes the steps. The first run of a program loads it
-    for half a second; the first one ever compiles it for some seconds.
-
     Parameters
     ----------
     fmu : path
@@ -236,7 +233,7 @@ class Scenario:
         """
         with self._opened(fmi) as (opened, loaded):
             loaded = replace(loaded, panels=())  # Integers, which only pages draw, cost time
-            result = simulation.simulate(opened, loaded, tolerance, compiled=True)
+            result = simulation.simulate(opened, loaded, tolerance)
             return Table(result.times, result.names, result.values, _units(opened.model))
 
     def errors(self, table: Table) -> dict[str, float]:

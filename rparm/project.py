@@ -16,6 +16,7 @@ models/SYSTEM/identification.py         makes a log of the system, to identify p
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
+build/loop/                             the library that steps FMUs, of rparm/loop
 build/runtime/runtime.json              what FMUs of own equations are linked with
 build/release/built.tar.xz              the same for all platforms, that program, and the playground
 fmu/equations_to_fmu.py                 makes these FMUs, in a separate process
@@ -326,6 +327,14 @@ def platform_name() -> str:
     return f"{machine}-{platform.system().lower()}"
 
 
+def loop_library() -> Path:
+    """Return the library that steps FMUs, for this machine (rparm/loop)."""
+    suffix = {"windows": ".dll", "darwin": ".dylib"}.get(platform_name().split("-")[1], ".so")
+    if INSTALLED:
+        return ROOT / "loop" / platform_name() / f"loop{suffix}"
+    return ROOT / "build" / "loop" / f"loop{suffix}"
+
+
 def built_for_all() -> Path:
     """Return the folder built by a release for each platform; UserError if there is none."""
     if INSTALLED:
@@ -465,8 +474,6 @@ def _user_cache() -> Path:
 def set_library_caches() -> None:
     """Lead the caches of libraries to folders that can be written, for child processes too."""
     os.environ.setdefault("MPLCONFIGDIR", str(cache_folder("matplotlib")))
-    if INSTALLED:  # in a checkout numba keeps its files beside the modules
-        os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder("numba")))
 
 
 def child_environment() -> dict[str, str]:

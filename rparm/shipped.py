@@ -7,6 +7,7 @@ share/pieces         contents of files in archives, as they are compressed there
 share/files.json.xz  "files": by VERSION OF FMI/NAME its SHA-256 and the numbers of its pieces;
                      "places": the first byte of each piece, in `pieces` if negative (~first),
                      else in "between", and its length
+share/loop           the library that steps FMUs, for each platform
 share/built.tar.xz   all else that is built for each platform (fmu/built.py)
 """
 

@@ -18,17 +18,15 @@ from rparm import building, project
 from rparm.campaign.campaign_file import Campaign, checked
 from rparm.campaign.job import Archive, Component, HeldInputs, Wiring
 from rparm.errors import UserError, WrongValueError, did_you_mean, placed
-from rparm.fmi.compiled_loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.runs import scenario
 from rparm.runs.scenario import Scenario
-from rparm.systems import master
 from rparm.systems.connected_instance import start_value
 from rparm.systems.opened import opened as open_system
 from rparm.systems.opened import system_file
 from rparm.systems.python_component import PythonComponent
-from rparm.systems.structure import Connection, OpenedSystem
+from rparm.systems.structure import OpenedSystem
 from rparm.systems.structure import times as chosen_times
 from rparm.units import quantity
 
@@ -43,7 +41,7 @@ class Base(ABC):
     KIND: ClassVar[str]  # for messages
     archives: dict[str, Archive]  # FMUs and Python components by their hash
     tolerance: float | None = None
-    wiring: Wiring | None = None  # of a system that the project's master steps
+    wiring: Wiring | None = None  # of a system
     questions: tuple[str, ...] = ()  # to ask the user about the scenario or system
     _fed: Collection[str] = ()  # inputs that outputs feed
 
@@ -141,19 +139,8 @@ class ScenarioBase(Base):
     def components(
         self, read: Sequence[tuple[int, str]], fixed: Mapping[tuple[int, str], Value]
     ) -> list[Component]:
-        variables = self._model.variables
-
-        def references(names: Sequence[str]) -> tuple[int, ...]:
-            return tuple(variables[name].reference for name in names)
-
-        reals, switches = list(self._reals), list(self._switches)
-        outputs = references([name for _, name in read])
-        parts = (
-            Part(references(reals), tuple(range(len(reals))), outputs),
-            Part(references(switches), tuple(range(len(switches))), ()),
-        )
         values = self._given[""] | {name: value for (_, name), value in fixed.items()}
-        return [Component(self._scenario.name, self._hash, values, *parts)]
+        return [Component(self._scenario.name, self._hash, values)]
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -198,14 +185,11 @@ class SystemBase(Base):
             self._hashes[name] = _sha256(read)
             self.archives[self._hashes[name]] = content
         system = self._system
-        if master.beyond_steps(system, opened.models):
-            self.wiring = Wiring(system.connections, system.order, dict(system.rates))
+        self.wiring = Wiring(system.connections, system.order, dict(system.rates))
         moved = system.inputs
         self._fed = {*(c.end for c in self._system.connections), *moved}
         for name, signal in moved.items():
             kind = opened.variable(name).type
-            if kind not in ("Real", "Boolean"):
-                raise UserError(f"{opened.path}: {name}: moves, and is neither Real nor Boolean")
             held = self._reals if kind == "Real" else self._switches
             held[name] = signal.values(times - self._system.start)
 
@@ -218,43 +202,14 @@ class SystemBase(Base):
     def components(
         self, read: Sequence[tuple[int, str]], fixed: Mapping[tuple[int, str], Value]
     ) -> list[Component]:
-        fed: dict[str, list[Connection]] = {"Real": [], "Boolean": []}
-        for c in self._system.connections:
-            kind = self._ssp.variable(c.start).type
-            if kind not in fed:
-                raise UserError(f"{self.path}: {c}: is neither Real nor Boolean")
-            fed[kind].append(c)
-
-        def source(c: Connection) -> tuple[int, str]:
-            return self._names.index(c.start_component), c.start_connector
-
-        outputs = {"Real": list(read), "Boolean": []}
-        moved = {"Real": list(self._reals), "Boolean": list(self._switches)}
-        for kind, known in outputs.items():
-            every = dict.fromkeys([*known, *map(source, fed[kind])])
-            known[:] = sorted(every, key=lambda key: key[0])
         result = []
         for i, name in enumerate(self._names):
-            parts = {}
-            for kind, known in outputs.items():
-                held = moved[kind]  # is in front of the outputs
-                sources = {c.end: len(held) + known.index(source(c)) for c in fed[kind]}
-                sources |= {end: place for place, end in enumerate(held)}
-                own = {end: x for end, x in sources.items() if self._variables[end][0] == i}
-                parts[kind] = Part(
-                    tuple(self._variables[end][1].reference for end in own),
-                    tuple(own.values()),
-                    tuple(self._reference(i, variable) for j, variable in known if j == i),
-                )
             with self._ssp.unpacked_fmu(name) as fmu:
                 given = self._parameters.get(name, {}).items()
                 values = {x: start_value(fmu, name, x, value) for x, value in given}
             values |= {variable: value for (j, variable), value in fixed.items() if j == i}
-            result.append(Component(name, self._hashes[name], values, *parts.values()))
+            result.append(Component(name, self._hashes[name], values))
         return result
-
-    def _reference(self, component: int, variable: str) -> int:
-        return self.models[component].variables[variable].reference
 
     @property
     def hashes(self) -> dict[str, str]:

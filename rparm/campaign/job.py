@@ -1,16 +1,14 @@
 """The job of a campaign: one picklable object with all that workers need, and what they measure.
 
-Measures are numbers of what was recorded in a run. Sums are made in compiled code, in the order of
-time: numpy's order depends on the processor.
+Measures are numbers of what was recorded in a run. Sums are cumulative ones, in the order of time:
+the order of numpy's sum depends on the processor.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from rparm.fmi.compiled_loop import Part
 from rparm.fmi.model import Value
 from rparm.systems.python_component import PythonComponent
 from rparm.systems.structure import Connection
@@ -80,63 +78,51 @@ def final_integer(variable: str) -> Measure:
     return Measure(f"final({variable})", (variable,), FINAL_INTEGER)
 
 
-@njit(cache=True, nogil=True)
-def _integral(times, values):
+def _sum(terms: np.ndarray) -> float:
+    return float(np.cumsum(terms)[-1]) if len(terms) else 0.0
+
+
+def _integral(times: np.ndarray, values: np.ndarray) -> float:
     """Integrate over time by the trapezoidal rule."""
-    total = 0.0
-    for i in range(len(times) - 1):
-        total += 0.5 * (times[i + 1] - times[i]) * (values[i] + values[i + 1])
-    return total
+    return _sum(0.5 * np.diff(times) * (values[:-1] + values[1:]))
 
 
-@njit(cache=True, nogil=True)
-def _rms(times, values):
+def _rms(times: np.ndarray, values: np.ndarray) -> float:
     """Return the root of the mean square over time."""
-    return np.sqrt(_integral(times, values * values) / (times[-1] - times[0]))
+    return float(np.sqrt(_integral(times, values * values) / (times[-1] - times[0])))
 
 
-@njit(cache=True, nogil=True)
-def _distance(rows, first, second):
+def _distance(rows: np.ndarray, first: Sequence[int], second: Sequence[int]) -> np.ndarray:
     """Return the distance (n + 1,) of points whose coordinates are columns `first` and `second`."""
-    result = np.empty(len(rows))
-    for i in range(len(rows)):
-        total = 0.0
-        for k in range(len(first)):
-            difference = rows[i, first[k]] - rows[i, second[k]]
-            total += difference * difference
-        result[i] = np.sqrt(total)
-    return result
+    total = np.zeros(len(rows))
+    for one, other in zip(first, second, strict=True):
+        total += (rows[:, one] - rows[:, other]) ** 2
+    return np.sqrt(total)
 
 
-@njit(cache=True, nogil=True)
-def _settling(times, values, target, band):
+def _settling(times: np.ndarray, values: np.ndarray, target: float, band: float) -> float:
     """Return the time since the start after which values stay in the band; NaN if none do."""
-    for i in range(len(values) - 1, -1, -1):
-        if not abs(values[i] - target) <= band:
-            return times[i + 1] - times[0] if i + 1 < len(values) else np.nan
-    return 0.0
+    outside = np.flatnonzero(~(np.abs(values - target) <= band))
+    if not len(outside):
+        return 0.0
+    after = outside[-1] + 1
+    return float(times[after] - times[0]) if after < len(times) else np.nan
 
 
-@njit(cache=True, nogil=True)
-def _crossings(values, level):
+def _crossings(values: np.ndarray, level: float) -> int:
     """Count how often the level is crossed upwards."""
-    count = 0
-    for i in range(len(values) - 1):
-        if values[i] < level <= values[i + 1]:
-            count += 1
-    return count
+    return int(np.count_nonzero((values[:-1] < level) & (level <= values[1:])))
 
 
-@njit(cache=True, nogil=True)
-def _log_sum(growth):
+def _log_sum(growth: np.ndarray) -> float:
     """Sum the logarithms; factors are multiplied as far as they go, which rounds less."""
     total, product = 0.0, 1.0
-    for factor in growth:
+    for factor in growth.tolist():
         product *= factor
         if not 1e-100 < product < 1e100:
-            total += np.log(product)
+            total += float(np.log(product))
             product = 1.0
-    return total + np.log(product)
+    return total + float(np.log(product))
 
 
 # ---- The job -------------------------------------------------------------------------------------
@@ -147,8 +133,6 @@ class Component:
     name: str
     archive: str  # hash of its FMU or code
     values: dict[str, Value]  # set before initialization
-    reals: Part
-    switches: Part  # Booleans
 
 
 @dataclass(frozen=True)
@@ -177,7 +161,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Wiring:
-    """What the project's master needs of a system that compiled code does not step."""
+    """How the components of a system are connected and step."""
 
     connections: tuple[Connection, ...]
     order: str
@@ -195,16 +179,14 @@ class Job:
     times: np.ndarray  # (n + 1,) communication points in s
     reals: HeldInputs
     switches: HeldInputs
-    propagates: bool  # outputs feed inputs
     watched: tuple[str, ...]  # recorded variables
-    columns: np.ndarray  # (watched,) of these, among the Reals of the loop
     integers: dict[str, tuple[int, str]]  # component and variable of those read at the end
-    tangent: tuple[np.ndarray, ...] | None  # the first fields of loop.Tangent
+    tangent: tuple[np.ndarray, ...] | None  # what loop.Tangent takes
     targets: tuple[tuple[str, Target], ...]  # by column of the table
     measures: tuple[Measure, ...]
     trajectories: frozenset[int]  # runs of which all that is recorded is kept
     hashes: dict[str, str]  # SHA-256 of the files that determine the runs
-    wiring: Wiring | None = None
+    wiring: Wiring | None = None  # of a system
 
     @property
     def steps(self) -> int:

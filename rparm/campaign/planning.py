@@ -70,11 +70,6 @@ class _Planner:
         components = tuple(base.components(list(read), fixed))
         self.check_tolerances(components, targets)
         reals, switches = base.held
-        first = np.cumsum([0, *(len(c.reals.outputs) for c in components)])
-        columns = [
-            len(reals.names) + first[c] + components[c].reals.outputs.index(variable.reference)
-            for c, variable in map(base.variable, watched)
-        ]
         self.check_columns(measures)
         return Job(
             components=components,
@@ -84,9 +79,7 @@ class _Planner:
             times=base.times,
             reals=reals,
             switches=switches,
-            propagates=len(components) > 1,
             watched=watched,
-            columns=np.array(columns, np.int64),
             integers=dict(zip(integers, self.read(integers), strict=True)),
             tangent=tangent,
             targets=tuple(targets.items()),

@@ -30,7 +30,7 @@ from rparm.files import check_writable, whole, written
 from rparm.interruption import temporary_folder
 
 MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
-PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib", "scipy")
+PACKAGES = ("dask", "distributed", "fmpy", "numpy", "pyarrow", "SALib", "scipy")
 WORKERS = ".{}.workers"  # with the number of the process
 DIGITS = len(str(MAX_RUNS))  # of numbers in names: names sort like runs
 CAMPAIGN, PART, SHA256 = b"campaign", b"part", b"sha256"  # keys of metadata

@@ -14,11 +14,9 @@ from typing import cast
 import numpy as np
 from distributed import Worker, WorkerPlugin, get_worker
 
-from rparm.campaign import mastered
-from rparm.campaign.job import Archive, Job, Recorded, Target
+from rparm.campaign.instances import Instances, instances
+from rparm.campaign.job import Archive, Job, Recorded
 from rparm.errors import UserError, one_line
-from rparm.fmi.compiled_loop import Stepper, Tangent
-from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.systems.python_component import PythonComponent
 
@@ -38,28 +36,22 @@ class Runner(AbstractContextManager["Runner"]):
 
     def __init__(self, job: Job, fmus: Mapping[str, Fmu]) -> None:
         self._job, self._fmus = job, fmus
-        self._stack = ExitStack()
-        self._instances: list[Instance] = []
-        parts = [c.reals for c in job.components], [c.switches for c in job.components]
-        self._stepper = Stepper(*parts, len(job.reals.names), len(job.switches.names))
-        self._points = np.arange(1, job.steps + 1)
-        self._held = job.reals.values.copy()
+        self._instances: Instances | None = None
         self._record = np.empty((len(job.times), len(job.watched)))
-        self._tangent = Tangent.none() if job.tangent is None else Tangent(*job.tangent)
         self._growth = np.empty(0 if job.tangent is None else job.steps)
         self._integers: list[int] = []  # at the end of the last run
         column = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
         self._columns = [[column[name] for name in m.variables] for m in job.measures]
 
     def __exit__(self, *error: object) -> None:
-        self._stack.__exit__(*error)
+        if self._instances is not None:
+            self._instances.__exit__(*error)
 
-    def instantiate(self) -> None:
-        """Load the FMUs and make their instances; UserError if that fails."""
-        for component in self._job.components:
-            instance = self._fmus[component.archive].instance(component.name)
-            self._instances.append(self._stack.enter_context(instance))
-        self._stepper.connect(self._instances)
+    def instantiate(self) -> Instances:
+        """Load the FMUs and make their instances, if there are none; UserError if that fails."""
+        if self._instances is None:
+            self._instances = instances(self._job, self._fmus)
+        return self._instances
 
     def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
         """Make runs, with the values (runs, targets) of the job's targets."""
@@ -81,92 +73,13 @@ class Runner(AbstractContextManager["Runner"]):
     def _run(self, point: np.ndarray) -> str:
         """Make one run; why it failed, or an empty text."""
         try:
-            if self._job.wiring is not None:
-                self._run_in_master(point)
-                return ""
-            self._initialize(point)
-            self._advance()
-            self._integers = [self._instances[c].integer(v) for c, v in self._job.integers.values()]
+            self._integers = self.instantiate().run(point, self._record, self._growth)
             return ""
         except UserError as error:
             with suppress(UserError):  # the run has failed already: instances are not used again
-                self._stack.close()
-            self._instances = []
+                self.__exit__(None, None, None)
+            self._instances = None
             return one_line(error)[:LONGEST_REASON]
-
-    def _run_in_master(self, point: np.ndarray) -> None:
-        for (_, target), value in zip(self._job.targets, point, strict=True):
-            if not np.isfinite(value):
-                raise UserError(f"{target.variable}: its value is not defined")
-            if target.held is not None:
-                self._held[:, target.held] = value
-        self._integers = mastered.run(self._job, self._fmus, point, self._held, self._record)
-
-    # ---- Initialization --------------------------------------------------------------------------
-
-    def _initialize(self, point: np.ndarray) -> None:
-        """Initialize new or used instances up to the first communication point, outputs read."""
-        job = self._job
-        if self._instances:
-            for instance in self._instances:
-                instance.reset()
-        else:
-            self.instantiate()
-        for instance, component in zip(self._instances, job.components, strict=True):
-            instance.set_up(job.start, job.stop, job.tolerance)
-            for name, value in component.values.items():
-                instance.set(name, value)
-        for (_, target), value in zip(job.targets, point, strict=True):
-            self._set_target(target, float(value))
-        for instance in self._instances:
-            instance.enter_initialization()
-        self._propagate("in initialization")
-        for instance in self._instances:
-            instance.exit_initialization()
-        start = f"at the start, t = {job.start!r} s,"
-        if job.propagates:  # samplers that tick at the start have ticked
-            self._propagate(start)
-        self._stepper.read_outputs(start)
-        self._record[0] = self._stepper.reals.values[job.columns]
-        self._tangent.deviation[:] = 1 / np.sqrt(max(len(self._tangent.deviation), 1))
-
-    def _set_target(self, target: Target, value: float) -> None:
-        if not np.isfinite(value):
-            raise UserError(f"{target.variable}: its value is not defined")
-        if target.held is not None:
-            self._held[:, target.held] = value
-            return
-        instance = self._instances[target.component]
-        kind = instance.fmu.model.variables[target.variable].type
-        instance.set(target.variable, int(value) if kind == "Integer" else value)
-
-    def _propagate(self, when: str) -> None:
-        """Set inputs at the start until no output follows any more."""
-        stepper, reals, switches = self._stepper, self._stepper.reals, self._stepper.switches
-        reals.values[: self._held.shape[1]] = self._held[0]
-        switches.values[: self._job.switches.values.shape[1]] = self._job.switches.values[0]
-        if not self._job.propagates:
-            stepper.set_inputs(when)
-            return
-        before = None
-        for _ in range(len(reals.to_set) + len(switches.to_set) + 2):
-            stepper.read_outputs(when)
-            found = np.concatenate([reals.values, switches.values])
-            if before is not None and np.array_equal(before, found):
-                return
-            before = found
-            stepper.set_inputs(when)
-        raise UserError("the connections form an algebraic loop")
-
-    # ---- Steps -----------------------------------------------------------------------------------
-
-    def _advance(self) -> None:
-        job = self._job
-        given = job.times, self._held, job.switches.values, self._points, job.columns
-        found = self._record[1:], self._tangent, self._growth
-        _, failure = self._stepper.advance(*given, *found)
-        if failure is not None:
-            raise failure
 
 
 @contextmanager

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from rparm.campaign.work import Work
 
-NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
+NEEDED = ("SALib", "cryptography", "distributed", "pyarrow", "scipy")
 
 
 def do_campaign(options: argparse.Namespace) -> Ended:

@@ -22,7 +22,8 @@ from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.interruption import ENDINGS
-from rparm.systems.connected_instance import begin_instance, check_finite
+from rparm.loop.loop import check_finite
+from rparm.systems.connected_instance import begin_instance
 from rparm.systems.master import beyond_steps
 from rparm.systems.structure import Connection, OpenedSystem
 

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
-from ctypes import Array, byref, c_double, c_int, c_uint, c_void_p
+from ctypes import Array, byref, c_double, c_int, c_int32, c_uint, c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
@@ -104,6 +104,12 @@ class Instance(ABC):
     INSTANTIATE: ClassVar[str]  # name of the function
     SETTERS: ClassVar[Mapping[str, str]]  # methods of LIBRARY, by type of the variable
     MARKS: ClassVar[str]  # regular expression of marks in messages that do not stand for themselves
+
+    # of an FMU that asks for inputs within a step
+    step_start: c_double | None = None  # s, of the present step
+    has_raised: c_int32 | None = None  # 1 if that has failed
+    # of what runs like an FMU: Real variables by their value references, not all of them perhaps
+    memory: np.ndarray | None = None
 
     def __init__(self, fmu: UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()) -> None:
         self.fmu = fmu
@@ -202,6 +208,10 @@ class Instance(ABC):
         why = own[1] if own else f"{when}: {said}" if said else when
         return UserError(f"{self.name}: the FMU ends the simulation {why}")
 
+    def raised(self) -> BaseException:
+        """Return what a function has raised that the FMU has called in the last call."""
+        raise NotImplementedError
+
     @contextmanager
     def explained(self, when: str) -> Iterator[None]:
         """Turn a call that fails inside into the user's error."""
@@ -268,6 +278,15 @@ class Instance(ABC):
         getter = self.SETTERS[variable.type].replace("set", "get")
         with self.explained(f"({name})"):
             return int(getattr(self.fmi, getter)([variable.reference])[0])
+
+    def value(self, name: str) -> float:
+        """Return the value of a variable that is no String."""
+        if self.fmu.model.variables[name].type != "Real":
+            return float(self.discrete(name))
+        found = self.reals([name])
+        with self.explained(f"({name})"):
+            found.get()
+        return float(found.view[0])
 
     def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
         """Return Real variables to get or set together, many times, in `memory` if given."""

@@ -7,7 +7,7 @@ initialized and read, not integrated: what an FMU answers at one time, either ki
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from ctypes import POINTER, Array, byref, c_double, sizeof
+from ctypes import POINTER, Array, byref, c_double, c_int32, sizeof
 from functools import partial
 
 import fmpy
@@ -154,8 +154,9 @@ class Fmi3Instance(Instance):
         )
         self._log_warnings()
         self._inputs: Callable[[float], object] | None = None  # sets them at a time in a step, s
-        self._start = 0.0  # s, of the present step
+        self.step_start = c_double()
         self._raised: BaseException | None = None  # in a callback, where it would be lost
+        self.has_raised = c_int32()
 
         # results of a step
         self._terminates = fmi3.fmi3Boolean()
@@ -199,14 +200,14 @@ class Fmi3Instance(Instance):
         factorials = np.array([math.factorial(power) for power in powers], dtype=float)
 
         def set_in_step(time: float) -> None:
-            elapsed = time - self._start
+            elapsed = time - self.step_start.value
             inputs.view[:] = elapsed**powers / factorials @ coefficients
             inputs.set()
 
         def set_all() -> None:
-            set_in_step(self._start)
-            self._inputs = set_in_step if order else None
+            set_in_step(self.step_start.value)
 
+        self._inputs = set_in_step if order else None
         return InputPolynomials(coefficients, set_all)
 
     def input_functions(
@@ -228,17 +229,21 @@ class Fmi3Instance(Instance):
         try:
             self._inputs(time)
         except BaseException as error:  # Ctrl-C, too
-            self._raised = error
+            self._raised, self.has_raised.value = error, True
+
+    def raised(self) -> BaseException:
+        assert self._raised is not None
+        error, self._raised, self.has_raised.value = self._raised, None, False
+        return error
 
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
         final = fmi3.fmi3False if goes_back else fmi3.fmi3True
-        self._start = start
+        self.step_start.value = start
         try:
             self.fmi.fmi3DoStep(self.fmi.component, start, length, final, *self._results)
         finally:
             if self._raised is not None:
-                error, self._raised = self._raised, None
-                raise error
+                raise self.raised()
         if self._terminates.value:
             raise self.ended(f"at t = {self._time.value!r} s")
 

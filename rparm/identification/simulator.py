@@ -12,12 +12,12 @@ import fmpy
 import numpy as np
 
 from rparm.errors import UserError
-from rparm.fmi.compiled_loop import Part, Stepper
 from rparm.fmi.fmi_instance import Instance, Reals
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import ARE_EXACT, INITIAL, Value, gradient_name
 from rparm.identification.logs import Segment
 from rparm.identification.request import Parameters
+from rparm.loop.loop import one_component
 
 Task, Answer = TypeVar("Task"), TypeVar("Answer")
 CORES = os.cpu_count() or 1
@@ -30,27 +30,12 @@ SHIFTS = (0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.5)  # towards the middle of all states, 
 
 @dataclass(frozen=True, eq=False)
 class _Wiring:
-    """An FMU, and what its runs take and give."""
+    """An FMU, and what its runs take and give, by name."""
 
     fmu: Fmu
-    reals: Part
-    switches: Part
-
-    @staticmethod
-    def of(
-        fmu: Fmu, inputs: Sequence[str], switches: Sequence[str], outputs: Sequence[str]
-    ) -> "_Wiring":
-        variables = fmu.model.variables
-
-        def references(names: Sequence[str]) -> tuple[int, ...]:
-            return tuple(variables[name].reference for name in names)
-
-        flags = references([ARE_EXACT] if ARE_EXACT in variables else [])
-        return _Wiring(
-            fmu,
-            Part(references(inputs), tuple(range(len(inputs))), references(outputs)),
-            Part(references(switches), tuple(range(len(switches))), flags),
-        )
+    inputs: Sequence[str]  # Reals
+    switches: Sequence[str]  # Booleans
+    outputs: Sequence[str]
 
 
 class Simulator:
@@ -76,11 +61,11 @@ class Simulator:
         self.fmu, self.names = fmu, (*parameters, *states)
         self.settings, self.tolerance = settings, tolerance
         self._outputs = len(outputs)
-        self._wirings = [_Wiring.of(fmu, inputs, switches, outputs)]
+        self._wirings = [_Wiring(fmu, inputs, switches, outputs)]
         if with_gradients is not None:
             by = [*parameters, *map("start({})".format, states)]
             slopes = [gradient_name(name, each) for name in outputs for each in by]
-            self._wirings.append(_Wiring.of(with_gradients, inputs, switches, [*outputs, *slopes]))
+            self._wirings.append(_Wiring(with_gradients, inputs, switches, [*outputs, *slopes]))
         self._own, self._runners = threading.local(), list[_Runner]()
         self._pool = ThreadPoolExecutor(CORES)
 
@@ -125,17 +110,15 @@ class _Runner:
     """One instance, whose runs begin with a reset."""
 
     def __init__(self, simulator: Simulator, wiring: _Wiring) -> None:
-        self._simulator, self._fmu = simulator, wiring.fmu
-        reals, switches = wiring.reals, wiring.switches
-        self._stepper = Stepper([reals], [switches], len(reals.inputs), len(switches.inputs))
-        self._watched = len(reals.inputs) + np.arange(len(reals.outputs))
+        self._simulator, self._wiring = simulator, wiring
         self._stack = ExitStack()
         self._instance: Instance | None = None
 
     @property
     def are_exact(self) -> bool:
         """Whether gradients of the last run are exact, of an FMU that has some."""
-        return bool(self._stepper.switches.values[-1])
+        assert self._instance is not None
+        return bool(self._instance.discrete(ARE_EXACT))
 
     def close(self) -> None:
         """Free the instance."""
@@ -156,12 +139,13 @@ class _Runner:
         if self._instance is not None:
             self._instance.reset()
             return self._instance, self._given
-        fmu = self._fmu
+        wiring = self._wiring
         with LOADING:
-            instance = self._stack.enter_context(fmu.instance(fmu.model.name))
+            instance = self._stack.enter_context(wiring.fmu.instance(wiring.fmu.model.name))
         self._instance = instance
         self._given = instance.reals(self._simulator.names)
-        self._stepper.connect([instance])
+        inputs, switches, outputs = wiring.inputs, wiring.switches, wiring.outputs
+        self._loop = one_component(instance, inputs, switches, outputs)
         return instance, self._given
 
     def _initialize(self, segment: Segment, values: np.ndarray) -> None:
@@ -174,21 +158,22 @@ class _Runner:
         with instance.explained("(parameters and start)"):
             given.set()
         instance.enter_initialization()
-        self._stepper.reals.values[: segment.inputs.shape[1]] = segment.inputs[0]
-        self._stepper.switches.values[: segment.switches.shape[1]] = segment.switches[0]
-        self._stepper.set_inputs("in initialization")
+        loop = self._loop
+        loop.start(float(segment.times[0]))
+        if segment.inputs.shape[1]:
+            loop.values[loop.state.first_driven :] = segment.inputs[0]
+        loop.set_inputs("in initialization")
+        loop.transfer(segment.switches[0].astype(np.int64))
         instance.exit_initialization()
-        self._stepper.read_outputs(f"at the start, t = {float(segment.times[0])!r} s,")
+        loop.read()
 
     def _advance(self, segment: Segment) -> np.ndarray:
-        record = np.empty((len(segment.times), len(self._watched)))
-        record[0] = self._stepper.reals.values[self._watched]
-        given, points = (segment.inputs, segment.switches), np.arange(1, len(segment.times))
-        where = points, self._watched, record[1:]
-        _, failure = self._stepper.advance(segment.times, *given, *where)
-        if failure is not None:
-            raise failure
-        return record
+        loop = self._loop
+        rows = np.empty((len(segment.times), loop.width))
+        rows[0] = loop.values[: loop.width]
+        scheduled = segment.switches[1:].astype(np.int64)
+        loop.run(segment.times[1:], segment.inputs[1:], scheduled, rows)
+        return rows
 
 
 # ---- Start states --------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ class AlgebraicLoop:
         self._sources = np.array([component.sources[i] for component, i in ends], dtype=int)
         self.components = list(dict.fromkeys(component for component, _ in ends))
         for component, i in ends:
-            component.on_loop[i] = component.solves = True
+            component.on_loop[i] = component.state.solves = True
         variables = [c.instance.fmu.model.variables[c.inputs.names[i]] for c, i in ends]
         self.nominals = np.array([variable.nominal or 1.0 for variable in variables])
         self.largest = np.zeros(len(ends))  # of each input so far

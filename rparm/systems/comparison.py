@@ -356,15 +356,9 @@ def _rows_at_whole_steps(
     with master_of(parted, fmus, way) as master:
         master.initialize(system.start, system.stop, system.parameter_sets[variant])
         columns = [master.names.index(name) for name in names]
-        rows = np.empty((system.steps + 1, len(names)))
-        rows[0] = master.values[columns]
-        for i in range(1, system.steps * parts + 1):
-            master.advance(system.start + i * system.step / parts)
-            if i % parts == 0:
-                rows[i // parts] = master.values[columns]
-            if i % 100 == 0:
-                progress(100)
-    return rows
+        count = np.arange(system.steps * parts + 1)
+        times = system.start + count * system.step / parts
+        return master.watch(times, columns, count[1:] % parts == 0, progress)
 
 
 # ---- study.py of a system ------------------------------------------------------------------------

@@ -24,20 +24,19 @@ both orders. Then all outputs are computed again at this time, as at the start.
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from ctypes import c_double
 
 import numpy as np
-from fmpy.fmi1 import FMICallException
 
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
+from rparm.loop.loop import Loop, check_finite
 from rparm.runs.inputs import Signal
 from rparm.systems.algebraic_loop import AlgebraicLoop
-from rparm.systems.connected_instance import ConnectedInstance, check_finite
+from rparm.systems.connected_instance import ConnectedInstance
 from rparm.systems.ecos import Run, said_at_end
 from rparm.systems.feedthrough import loops, on_loops, sequence
 from rparm.systems.python_component import is_python
@@ -81,7 +80,8 @@ class SystemSnapshot(AbstractContextManager["SystemSnapshot"]):
         for component, state in zip(master.components.values(), self._states, strict=True):
             with component.instance.explained(self._when()):
                 state.restore()
-        master.time, master.values[:], master.slopes[:], places, solved = self._kept
+        time, master.values[:], master.slopes[:], places, solved = self._kept
+        master.loop.state.time = time
         for component, place in zip(master.components.values(), places, strict=True):
             component.go_to(*place)
         for loop, place in zip(master.loops, solved, strict=True):
@@ -128,7 +128,6 @@ class Master(AbstractContextManager["Master"]):
             raise UserError(f"expected an order of {ORDERS} and inputs of {INPUT_MODES}")
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
-        self.time, self.do_steps = 0.0, 0
         connections, signals = list(connections), signals or {}
         self._switches, real = _split(fmus, connections)
         self._links = len(connections) + len(signals)  # values pass each once
@@ -182,8 +181,8 @@ class Master(AbstractContextManager["Master"]):
         keys += driven
         index = {key: i for i, key in enumerate(keys)}
         self.names = tuple(f"{component}.{name}" for component, name in keys)
-        memory = (c_double * max(len(keys), 1))()
-        self.values = np.frombuffer(memory)[: len(keys)]
+        memory = np.zeros(len(keys) + 1)  # never empty
+        self.values = memory[: len(keys)]
         self.slopes = np.zeros(len(keys))
 
         # the components with their sources
@@ -205,15 +204,38 @@ class Master(AbstractContextManager["Master"]):
                 sources=[index[source] for source in sources],
                 ahead=[rank[x] < rank[name] for x, _ in sources],
                 values=memory,
-                slopes=self.slopes,
                 every=rates.get(name),
             )  # fmt: skip
             first += len(outputs[name])
-        self._groups = [[self.components[name] for name in group] for group in groups]
         self.loops = [self._loop(circle) for circle in circles]
-        self._all = list(self.components.values())
-        self._has_rates = any(component.every is not None for component in self._all)
-        self.due = self._all  # that the last step has brought to its end
+        all_ = list(self.components.values())
+        place = {name: i for i, name in enumerate(self.components)}
+        stepping = [[place[name] for name in group] for group in groups]
+        loop = Loop(all_, self.values, len(driven), stepping, self.slopes)
+        loop.switch(
+            [(k, place[name], variable) for k, (name, variable) in enumerate(self._switched)]
+            + [((place[c.start_component], c.start_connector),
+                place[c.end_component], c.end_connector) for c in self._switches],
+            len(self._switched),
+        )  # fmt: skip
+        self._groups = [[all_[i] for i in group] for group in stepping]
+        loop.call(self._solve_group if circles else None, self._follow)
+        loop.state.extrapolates, loop.state.checks_finite = self.extrapolates, True
+        loop.state.has_rates = any(component.state.every for component in all_)
+        self.loop = loop
+
+    @property
+    def time(self) -> float:
+        return self.loop.state.time
+
+    @property
+    def do_steps(self) -> int:
+        return self.loop.state.step_count
+
+    @property
+    def due(self) -> list[ConnectedInstance]:
+        """Components that the last step has brought to the end of their own."""
+        return [component for component in self.components.values() if component.is_due]
 
     def _loop(self, circle: Sequence[Connection]) -> AlgebraicLoop:
         rank = {name: i for i, name in enumerate(self.components)}
@@ -228,6 +250,15 @@ class Master(AbstractContextManager["Master"]):
 
     # ---- Initialization --------------------------------------------------------------------------
 
+    def reset(self) -> None:
+        """Reset all instances, to initialize them again."""
+        for component in self.components.values():
+            component.instance.reset()
+            component.kept[:] = 0.0
+        self.values[:], self.slopes[:] = 0.0, 0.0
+        for loop in self.loops:
+            loop.go_to(np.zeros_like(loop.largest), None)
+
     def initialize(
         self,
         start: float,
@@ -240,10 +271,9 @@ class Master(AbstractContextManager["Master"]):
             if name not in self.components:
                 known = ", ".join(self.components)
                 raise UserError(f"{name}: no such component (there are: {known})")
-        self.time = self._start = start
-        self.due = self._all
+        self.loop.start(start)
         self._drive()
-        for component in self.due:
+        for component in self.components.values():
             component.begin(start, stop, parameters.get(component.name, {}))
         self._propagate(self._read_early, "in initialization")
         for component in self.components.values():
@@ -252,15 +282,26 @@ class Master(AbstractContextManager["Master"]):
 
     def _drive(self) -> None:
         """Take the values that signals have now."""
-        elapsed = np.array([self.time - self._start])
-        for i, signal in enumerate(self._moved.values(), self._first_driven):
-            self.values[i] = signal.values(elapsed)[0]
+        self.values[self._first_driven :] = self._driven(np.array([self.time]))[0]
+
+    def _driven(self, times: np.ndarray) -> np.ndarray:
+        """Return what drives Real inputs at times, (times, inputs)."""
+        return self._sampled(self._moved.values(), times, np.float64)
+
+    def _scheduled(self, times: np.ndarray) -> np.ndarray:
+        """Return what drives discrete inputs at times, (times, inputs)."""
+        return self._sampled(self._switched.values(), times, np.int64)
+
+    def _sampled(self, signals: Collection[Signal], times: np.ndarray, kind: type) -> np.ndarray:
+        elapsed = times - self.loop.state.start
+        columns = [signal.values(elapsed).astype(kind) for signal in signals]
+        return np.column_stack(columns) if columns else np.empty((len(times), 0), kind)
 
     def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
         before = np.full(len(self.names), np.nan)
         for _ in range(self._links + 2):
-            switched = self._transfer_switches()
+            switched = self.loop.transfer(self._scheduled(np.array([self.time])))
             for component in self.due:
                 read(component)
             self._solve(self.due, when)
@@ -283,122 +324,71 @@ class Master(AbstractContextManager["Master"]):
         for loop in self.loops:
             loop.solve(self.values, components, when)
 
+    def _solve_group(self, group: int) -> None:
+        """Solve, where components of a group have come to their end within a step."""
+        stepping = [component for component in self._groups[group] if component.is_due]
+        self._solve(stepping, f"at t = {self.loop.state.end!r} s")
+
     def _follow(self) -> None:
         """Compute all outputs at this time from inputs that follow them at once."""
         when = f"at t = {self.time!r} s"
-        self._propagate(lambda component: self._read(component, self.time), when)
+        self._propagate(self._read, when)
         if self.extrapolates:
-            self._propagate_slopes()
-            for component in self.due:
-                component.level_slopes()
-
-    def _transfer_switches(self) -> list[str]:
-        """Set the discrete inputs whose sources have another value, and return their names."""
-        elapsed = np.array([self.time - self._start])
-        wanted = {end: int(x.values(elapsed)[0]) for end, x in self._switched.items()}
-        for c in self._switches:
-            source = self.components[c.start_component].instance
-            wanted[c.end_component, c.end_connector] = source.discrete(c.start_connector)
-        changed = []
-        for (component, variable), value in wanted.items():
-            target = self.components[component].instance
-            is_here = self.components[component] in self.due
-            if is_here and value != target.discrete(variable):
-                target.set(variable, value)
-                changed.append(f"{component}.{variable}")
-        return changed
+            self.loop.follow_slopes()
 
     def _read_early(self, component: ConnectedInstance) -> None:
         with component.instance.explained_early():
             component.read()
         check_finite(component.name, component.outputs, "in initialization")
 
-    def _propagate_slopes(self) -> None:
-        """Read slopes at one time: once per component, since inputs' slopes show in outputs'."""
-        when = f"for slopes at t = {self.time!r} s"
-        for _ in self.due:
-            for component in self.due:
-                with component.instance.explained(when):
-                    component.read_slopes()
-            for component in self.due:
-                with component.instance.explained(when):
-                    component.keep(self.values, self.slopes)
-                    component.set_lines(0.0)
-        for component in self.due:
-            with component.instance.explained(when):
-                component.read_slopes()
+    def _read(self, component: ConnectedInstance) -> None:
+        when = f"at t = {self.time!r} s"
+        with component.instance.explained(when):
+            component.read()
+        check_finite(component.name, component.outputs, when)
 
     # ---- Steps -----------------------------------------------------------------------------------
 
     def advance(self, end: float) -> None:
         """Make one step to the time `end`, s; components of other rates do when theirs ends."""
-        length = end - self.time
-        for component in self._all:
-            if component.time == self.time:
-                component.keep(self._at(self.time), self.slopes if self.extrapolates else None)
-        if self._has_rates:
-            self.due = [c for c in self._all if c.is_due(end, length)]
-        for group in self._groups:
-            stepping = [c for c in group if c in self.due] if self._has_rates else group
-            before = [(c.outputs.view.copy(), c.time) for c in stepping if self.extrapolates]
-            for component in stepping:
-                if component.has_ahead:
-                    component.renew(self._at(component.time), self.slopes)
-                self._step(component, end)
-            for component in stepping:
-                self._read(component, end)
-                component.ended(end, length)
-            self._solve(stepping, f"at t = {end!r} s")
-            for component, (values, begin) in zip(stepping, before, strict=False):
-                component.draw_slopes(values, end - begin)
-        self.time = end
-        self._drive()
-        if self._transfer_switches():
-            self._follow()
+        self.run_to(np.array([end]))
 
-    def _at(self, time: float) -> np.ndarray:
-        """Return all values at a time, by lines if inputs are extrapolated."""
-        if not self.extrapolates:
-            return self.values
-        found = self.values.copy()
-        for c in self.components.values():
-            found[c.first : c.end] += self.slopes[c.first : c.end] * (time - c.time)
-        return found
-
-    def _step(self, component: ConnectedInstance, end: float) -> None:
-        begin, length = component.time, end - component.time
-        try:
-            if self.extrapolates:
-                component.set_lines(length)
-            else:
-                component.set_inputs(component.kept[0])
-            component.instance.do_step(begin, length, goes_back=True)
-            if self.extrapolates:
-                component.read_slopes()
-                component.end_lines(length)
-        except FMICallException as error:
-            when = f"in the step from t = {begin!r} s"
-            raise component.instance.failure(error, when) from error
-        self.do_steps += 1
-
-    def _read(self, component: ConnectedInstance, end: float) -> None:
-        try:
-            component.read()
-        except FMICallException as error:
-            raise component.instance.failure(error, f"at t = {end!r} s") from error
-        check_finite(component.name, component.outputs, f"at t = {end!r} s")
+    def run_to(
+        self,
+        ends: np.ndarray,
+        rows: np.ndarray | None = None,
+        has_row: np.ndarray | None = None,
+        progress: Callable[[int], object] | None = None,
+    ) -> None:
+        """Make steps to their ends, s; `rows` and `has_row` as `Loop.run` explains."""
+        given = self._driven(ends), self._scheduled(ends)
+        self.loop.run(ends, *given, rows=rows, has_row=has_row, progress=progress)
 
     def run(
-        self, times: Sequence[float], progress: Callable[[int], object] = lambda _: None
+        self, times: Sequence[float] | np.ndarray, progress: Callable[[int], object] | None = None
     ) -> np.ndarray:
         """Step from times[0]; return rows (times, names) of the values after each step."""
-        rows = np.empty((len(times), len(self.names)))
-        rows[0] = self.values
-        for i, end in enumerate(np.asarray(times)[1:].tolist(), start=1):
-            self.advance(end)
-            rows[i] = self.values
-            if i % 100 == 0:
-                progress(100)
+        return self.watch(times, range(len(self.names)), progress=progress)
+
+    def watch(
+        self,
+        times: Sequence[float] | np.ndarray,
+        columns: Sequence[int],
+        has_row: np.ndarray | None = None,
+        progress: Callable[[int], object] | None = None,
+        rows: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Step from times[0]; return rows of some values there and after each step.
+
+        `has_row` (steps,) tells the steps that end in a row; default: all. `rows` is filled if it
+        is given.
+        """
+        ends = np.asarray(times, float)[1:]
+        if rows is None:
+            rows = np.empty((1 + (len(ends) if has_row is None else has_row.sum()), len(columns)))
+        rows[0] = self.values[list(columns)]
+        self.loop.record(columns)
+        self.run_to(ends, rows, has_row, progress)
         return rows
 
 
@@ -511,72 +501,43 @@ def run_in_master(
     ssp: OpenedSystem,
     variant: str,
     names: Sequence[str],
-    progress: Callable[[int], object] = lambda _: None,
+    progress: Callable[[int], object] | None = None,
 ) -> Run:
     """Run a variant; read ``component.variable`` as Ecos would, all finite.
 
     In Jacobi order rows are read after the inputs of the next step have been set, in others at the
-    end of each step. `progress` is called with the steps just done.
+    end of each step. `progress` gets the number of steps since its last call.
     """
     system = ssp.system
     times = system.times
     rows = np.empty((len(times), len(names)))
     with ssp.unpacked_fmus() as fmus, master_of(ssp, fmus) as master:
         master.initialize(system.start, float(times[-1]), system.parameter_sets[variant])
-        readers = [_RowReader(ssp, c, names) for c in master.components.values()]
-        sets = WAYS[system.order] == WAYS["jacobi"]
+        for component in master.components.values():
+            own = {
+                variable: column
+                for column, name in enumerate(names)
+                for owner, variable in [ssp.split(name)]
+                if owner == component.name
+            }
+            component.read_for_rows(own)
+        loop = master.loop
+        loop.record([], len(names))
+        loop.state.sets_for_rows = WAYS[system.order] == WAYS["jacobi"]
         begin = time.perf_counter()
-        for row, end in enumerate(times.tolist()):
-            try:
-                if row:
-                    master.advance(end)
-                    rows[row] = rows[row - 1]  # of components that are within a step
-                for reader in readers:
-                    component = reader.component
-                    if component not in master.due:
-                        continue
-                    with component.instance.explained(f"at t = {end!r} s"):
-                        if sets:
-                            component.follow(master.values)
-                        reader.read(rows[row])
-            except UserError as error:
-                if row > 1:
-                    error.result = Run(tuple(names), times[:row], rows[:row], 0.0, ())
-                raise
-            if row and row % 100 == 0:
-                progress(100)
+        try:
+            loop.read_row(rows[0])
+            master.run_to(times[1:], rows, progress=progress)
+        except UserError as error:
+            if loop.done:
+                made = 1 + loop.done
+                error.result = Run(tuple(names), times[:made], rows[:made], 0.0, ())
+            raise
         wall_time = time.perf_counter() - begin
         known = master.components.values()
         messages = [f"{c.name!r}: {text}" for c in known for text in c.instance.messages]
-        said, last = {}, np.empty(1)
+        said = {}
         for name in said_at_end(ssp):
-            _RowReader(ssp, master.components[ssp.split(name)[0]], [name]).read(last)
-            said[name] = float(last[0])
-    return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)
-
-
-class _RowReader:
-    """Reads the wanted variables of one component into a row of the system's."""
-
-    def __init__(
-        self, ssp: OpenedSystem, component: ConnectedInstance, names: Sequence[str]
-    ) -> None:
-        self.component = component
-        instance = component.instance
-        own: dict[str, int] = {}
-        for column, name in enumerate(names):
             owner, variable = ssp.split(name)
-            if owner == component.name:
-                own[variable] = column
-        variables = ssp.models[component.name].variables
-        real = [name for name in own if variables[name].type == "Real"]
-        self._reals = instance.reals(real)
-        self._real_columns = [own[name] for name in real]
-        self._others = {own[name]: name for name in own.keys() - set(real)}
-        self._discrete = instance.discrete
-
-    def read(self, row: np.ndarray) -> None:
-        self._reals.get()
-        row[self._real_columns] = self._reals.view
-        for column, name in self._others.items():
-            row[column] = self._discrete(name)
+            said[name] = master.components[owner].instance.value(variable)
+    return Run(tuple(names), times, rows, wall_time, tuple(dict.fromkeys(messages)), said)

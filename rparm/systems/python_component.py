@@ -338,7 +338,11 @@ class PythonInstance(Instance):
         self._count = len(made.inputs)
         self._exchanged = [*made.inputs, *made.outputs]
         self._names = list(self.fmu.model.variables)
-        self.numbers = np.zeros(len(self._exchanged))  # inputs, then outputs
+        self._given = {*made.outputs, *made.switched_outputs}  # by a step
+        if self.memory is None:  # it stays where it is
+            self.memory = np.zeros(len(self._exchanged))
+        self.numbers = self.memory  # inputs, then outputs
+        self.numbers[:] = 0.0
         # Booleans and Integers
         self.switches = {name: 0 for name in (*made.switched_inputs, *made.switched_outputs)}
 
@@ -441,25 +445,29 @@ class PythonInstance(Instance):
     # ---- Steps -----------------------------------------------------------------------------------
 
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
-        result, when = self._called(start, length, self.numbers[: self._count])
-        self.switches |= {
-            name: self._switch(name, result[name], when) for name in self.made.switched_outputs
-        }
-        self.numbers[self._count :] = self._reals(result, when)
+        result = self._called(start, length, self.numbers[: self._count])
+        for name in self.made.switched_outputs:
+            self.switches[name] = self._switch(name, result[name], _when(start))
+        self.numbers[self._count :] = self._reals(result, start)
 
     def stepped(self, start: float, length: float, inputs: np.ndarray) -> list[float]:
         """Call the user's step with Real inputs; return its Real outputs, in their order."""
-        return self._reals(*self._called(start, length, inputs))
+        return self._reals(self._called(start, length, inputs), start)
 
-    def _called(
-        self, start: float, length: float, inputs: np.ndarray
-    ) -> tuple[Mapping[str, Any], str]:
-        when = f"in the step from t = {start!r} s"
+    def _called(self, start: float, length: float, inputs: np.ndarray) -> Mapping[str, Any]:
+        """Return what the user's step gives: all outputs, and nothing else."""
         given = _Inputs(zip(self.made.inputs, inputs.tolist(), strict=True))
         for name in self.made.switched_inputs:
             given[name] = self.made.kinds[name](self.switches[name])
-        with self.fmu.explained(when, self.name):
+        try:  # explained() would take as long as a short step
             result = self.made.step(start, length, given)
+        except UserError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise self.fmu.failure(error, _when(start), self.name) from error
+        if type(result) is dict and result.keys() == self._given:
+            return result
+        when = _when(start)
         if not isinstance(result, Mapping):
             raise self._wrong(f"step: expected a dict of outputs, got {show(result)} {when}")
         for name in result:
@@ -468,10 +476,14 @@ class PythonInstance(Instance):
         missing = [name for name in outputs if name not in result]
         if missing:
             raise self._wrong(f"step: returned no {missing[0]!r} {when}")
-        return result, when
+        return result
 
-    def _reals(self, result: Mapping[str, Any], when: str) -> list[float]:
-        return [self._number(name, result[name], when) for name in self.made.outputs]
+    def _reals(self, result: Mapping[str, Any], start: float) -> list[float]:
+        found = [result[name] for name in self.made.outputs]
+        if all(type(value) is float and math.isfinite(value) for value in found):
+            return found
+        when = _when(start)
+        return [self._number(x, y, when) for x, y in zip(self.made.outputs, found, strict=True)]
 
     def snapshot(self) -> Snapshot:
         return cast(Snapshot, _Snapshot(self))
@@ -518,6 +530,10 @@ class PythonInstance(Instance):
         return int(number)
 
 
+def _when(start: float) -> str:
+    return f"in the step from t = {start!r} s"
+
+
 class _Snapshot:
     """A snapshot of an instance in Python, which does what one of an FMU does."""
 
@@ -539,7 +555,7 @@ class _Snapshot:
 
 # ---- Called from compiled code -------------------------------------------------------------------
 class _Calls:
-    """Functions of C with the names of FMI 2.0, for the loop that numba compiles."""
+    """Functions of C with the names of FMI 2.0, for the loop; inputs and outputs are in memory."""
 
     component = INSTANCE
 
@@ -551,6 +567,7 @@ class _Calls:
         self.fmi2SetReal = values(self._moved(instance.put_reals))
         self.fmi2GetBoolean = values(self._moved(instance.get_switches, c_int))
         self.fmi2SetBoolean = values(self._moved(instance.put_switches, c_int))
+        self.fmi2GetInteger, self.fmi2SetInteger = self.fmi2GetBoolean, self.fmi2SetBoolean
         self.fmi2DoStep = step(lambda _, t, h, __: self._status(instance.do_step, t, h))
 
     def _moved(self, move: Callable[..., None], of: type = c_double) -> Callable[..., int]:

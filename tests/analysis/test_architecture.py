@@ -40,6 +40,7 @@ MAY_INCLUDE = {
     r"fmu/fmi\d": ("fmu/fmi", "src/instance", "src/model"),
     r"models": ("src/model",),
     r"models/\w+(/with_elements)?": ("models", "src/model"),
+    r"rparm/loop": (),
 }  # fmt: skip
 # the equations of another model
 MAY_INCLUDE_MODEL = {
@@ -67,8 +68,8 @@ LIBRARIES = {
     "POSIX": (r"sched\.h", r"src/model"),  # platform.h: another thread may run
     "x86-64": (r"cpuid\.h", r"src/model"),  # platform.h: the processor has AVX2
     "SUNDIALS": (r"(arkode|cvode|nvector|sun\w+)/\w+\.h", r"src/integrator"),
-    "FMI 2.0": (r"fmi2\w+\.h", r"fmu/fmi2"),
-    "FMI 3.0": (r"fmi3\w+\.h", r"fmu/fmi3"),
+    "FMI 2.0": (r"fmi2\w+\.h", r"fmu/fmi2|rparm/loop"),
+    "FMI 3.0": (r"fmi3\w+\.h", r"fmu/fmi3|rparm/loop"),
 }
 
 # Python, by the first part of the path; tests import everything
@@ -98,7 +99,7 @@ NOT_LOADED = {
     "import rparm.campaign.runs": {"scipy.stats", "SALib", "matplotlib"},
     "from rparm.__main__ import main; main(['list']);"
     "import rparm.commands.run, rparm.commands.system": {
-        "dask", "distributed", "numba", "pyarrow", "SALib",
+        "dask", "distributed", "pyarrow", "SALib",
     },
 }  # fmt: skip
 

@@ -35,7 +35,7 @@ COMMANDS = {
         "fmu/equations_schema.py",
     ),
     "campaign": (
-        "rparm/commands/campaign.py", "rparm/campaign/*.py", "rparm/fmi/compiled_*.py",
+        "rparm/commands/campaign.py", "rparm/campaign/*.py",
     ),
     "control": (
         "rparm/commands/linearize.py", "rparm/linearization/*.py", "rparm/commands/identify.py",
@@ -48,7 +48,7 @@ COMMANDS = {
 # what others use only where its packages are installed
 OPTIONAL = (
     "rparm/campaign/*.py", "rparm/federation/*.py", "rparm/identification/*.py",
-    "rparm/linearization/*.py", "rparm/fmi/compiled_*.py",
+    "rparm/linearization/*.py",
 )  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]

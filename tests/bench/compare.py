@@ -13,6 +13,7 @@ import os
 import re
 import statistics
 import sys
+import tempfile
 from collections import defaultdict
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -20,6 +21,7 @@ from pathlib import Path
 
 import by_gradients
 import by_models
+import by_systems
 from by_heyoka import Peer, Work
 from solvers import MUJOCO_IMPLICITFAST, MUJOCO_RK4, PLAIN_LOOP, Solvers
 
@@ -89,6 +91,7 @@ GROUPS = {
     "against": ("One against another", ("ratio", "error", "error_of_peer")),
     "models": ("Models in equations", ("us", "ratio", "error", "error_of_peer")),
     "gradients": ("Gradients, 10 masses, in runs without", ("us", "ratio")),
+    "loop": ("The loop of rparm", ("us", "ratio")),
     "plant": ("Friction and stops, steps of 1 ms", ("us", "ratio", "events")),
     "life": ("An instance", ("us", "kib")),
 }
@@ -420,6 +423,8 @@ def main() -> None:
     print("an instance, friction and stops, models in equations", file=sys.stderr)
     rows += by_models.rows(options.repeats, solvers.library)
     rows += by_gradients.rows(options.repeats)
+    with tempfile.TemporaryDirectory() as folder:
+        rows += by_systems.rows(options.repeats, options.build, Path(folder), solvers)
     rows += plant_rows(solvers, options.repeats) + life_rows(solvers, options.repeats)
     result = {
         "machine": about | {"loops": solvers.made_by, "MuJoCo": solvers.mujoco_version},

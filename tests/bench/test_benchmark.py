@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import by_gradients
 import by_models
+import by_systems
 import compare
 from solvers import Solvers
 
@@ -34,7 +35,7 @@ def rows(solvers: Solvers) -> list[dict]:
 
 def test_all_methods_and_peers_have_their_rows(rows: list[dict], solvers: Solvers) -> None:
     assert solvers.mujoco_version, "MuJoCo is a requirement of the tests"
-    assert {row["group"] for row in rows} == {*compare.GROUPS} - {"models", "gradients"}
+    assert {row["group"] for row in rows} == {*compare.GROUPS} - {"models", "gradients", "loop"}
     runs = {group: {x["run"] for x in rows if x["group"] == group} for group in compare.GROUPS}
     assert runs["steps"] >= METHODS | {"plain loop", "MuJoCo RK4", "MuJoCo implicitfast"}
     assert runs["life"] == runs["plant"] == METHODS
@@ -142,3 +143,9 @@ def test_gradients_are_measured_for_all_methods() -> None:
     assert {(row["run"], row["work"]) for row in found} == wanted
     assert all(0.0 < row["ratio"] < 42.0 for row in found if row["run"] == "cvode_bdf")
     assert "gradients by 20: taylor" in "\n".join(compare.of_group(found, "gradients"))
+
+
+def test_the_loop_is_measured_against_what_it_calls(solvers: Solvers, tmp_path: Path) -> None:
+    found = compare.judge(by_systems.rows(1, BUILD, tmp_path, solvers))
+    assert [row["us"] > 0.0 for row in found] == [True] * 4
+    assert "rparm.simulate to a loop in C" in "\n".join(compare.of_group(found, "loop"))

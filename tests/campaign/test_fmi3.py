@@ -2,16 +2,15 @@
 
 import re
 import zipfile
-from ctypes import CFUNCTYPE, POINTER, c_bool, c_double, c_int, c_void_p, cast
 from pathlib import Path
 
 import numpy as np
 
 from rparm.campaign.job import LYAPUNOV
 from rparm.campaign.runs import Rows
-from rparm.fmi.compiled_loop import COLUMNS, DO_STEP
 from tests.campaign.files import ARM, HEAD, campaign, write
 from tests.campaign.runners import rows, runner
+from tests.support.intercepted import intercept
 from tests.support.rparm_project import BUILD, FMUS, Console, fmi3_fmu, repacked
 
 ARM2 = FMUS["rp_manipulator"]
@@ -82,32 +81,24 @@ def test_a_step_that_fails_says_why(tmp_path: Path) -> None:
             )
 
 
-STEP3 = CFUNCTYPE(
-    *(c_int, c_void_p, c_double, c_double, c_bool), *(*[POINTER(c_bool)] * 3, POINTER(c_double))
-)
-
-
 def test_a_run_that_the_fmu_ends_has_failed(tmp_path: Path) -> None:
     given = campaign(tmp_path)
     with runner(given, tmp_path, fmu=ARM3) as (runs, job, points):
         expected = rows(runs, job, points, [0, 1])
-        column = COLUMNS + 1 + DO_STEP  # for the adapter
-        do_step = STEP3(int(runs._stepper.calls[0, column]))
         final = set()
 
-        @STEP3
-        def end(instance, time, length, last, event, terminates, early, reached):
+        def end(do_step, instance, time, length, last, event, terminates, early, reached):
             final.add(last)
             status = do_step(instance, time, length, last, event, terminates, early, reached)
             terminates[0] = time >= 0.5
             return status
 
-        runs._stepper.calls[0, column] = cast(end, c_void_p).value
+        (component,) = runs.instantiate().loop.components
+        kept = intercept(component, "fmi3DoStep", end)
         found = rows(runs, job, points, [0, 1])
+        del kept
     assert final == {True}
-    assert found.failures[0] == (
-        "hanging_swing: the FMU ends the simulation in the step from t = 0.5 s"
-    )
+    assert found.failures[0] == "hanging_swing: the FMU ends the simulation at t = 0.505 s"
     assert np.isnan(found.measures[0]).all()
     assert not found.failures[1]  # by another instance, whose steps are its own
     assert np.array_equal(found.measures[1], expected.measures[1])

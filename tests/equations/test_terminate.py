@@ -215,11 +215,8 @@ def test_events_of_components_have_their_names(tmp_path: Path) -> None:
         assert instance.messages[-1].endswith(REASON.replace("empty:", "a.b.empty:", 1))
 
 
-@pytest.mark.parametrize("compiled", [False, True])
 @VERSIONS
-def test_a_run_keeps_its_rows_and_says_why_it_ended(
-    version: str, compiled: bool, tmp_path: Path
-) -> None:
+def test_a_run_keeps_its_rows_and_says_why_it_ended(version: str, tmp_path: Path) -> None:
     file = tmp_path / "run.toml"
     file.write_text(
         f'fmu = "{of_version(made(TANK), version)}"\ntitle = "T"\ndescription = "D"\n'
@@ -228,7 +225,7 @@ def test_a_run_keeps_its_rows_and_says_why_it_ended(
     said = rf"the FMU ends the simulation at t = (18\.0|17\.9)\d*: {re.escape(REASON)}$"
     with Fmu(of_version(made(TANK), version)) as fmu:
         with pytest.raises(StoppedError, match=f"^run: {said}") as stopped:
-            simulation.simulate(fmu, load(file, fmu.model), compiled=compiled)
+            simulation.simulate(fmu, load(file, fmu.model))
         result = stopped.value.result
         assert len(result.times) == 26 and result.times[-1] == pytest.approx(17.5)
         height = result.values[:, result.names.index("h")]

@@ -1,8 +1,9 @@
 """The master, on oscillators x'' = -omega^2 x + gain u; its step-size control; Booleans."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from rparm.systems import step_control
 from rparm.systems.master import Master, SystemSnapshot
 from rparm.systems.python_component import PythonComponent
 from rparm.systems.structure import Connection
+from tests.support.intercepted import intercept
 from tests.support.paths import ROOT
 from tests.support.rparm_project import BUILD, MISTAKES, fmi3_fmu
 
@@ -224,22 +226,22 @@ def test_every_snapshot_is_freed(oscillator: Fmu, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_value_that_is_not_finite_is_named(
-    oscillator: Fmu, monkeypatch: pytest.MonkeyPatch, value: float
-) -> None:
+def test_a_value_that_is_not_finite_is_named(oscillator: Fmu, value: float) -> None:
     with ring(oscillator) as master:
         component = master.components["b"]
-        read = component.read
+        energy = component.outputs.names.index("energy")
 
-        def spoil() -> None:
-            read()
+        def spoil(read: Callable[..., int], *arguments: Any) -> int:
+            status = read(*arguments)
             if master.time >= 0.1:
-                outputs = component.outputs
-                outputs.view[outputs.names.index("energy")] = value
+                arguments[3][energy] = value
+            return status
 
-        monkeypatch.setattr(component, "read", spoil)
+        reads = {"2.0": "fmi2GetReal", "3.0": "fmi3GetFloat64"}
+        kept = intercept(component, reads[oscillator.model.fmi_version], spoil)
         with pytest.raises(UserError, match=rf"b\.energy is {value} at t = 0\.15000"):
             master.run(np.arange(10) * H)
+        del kept
 
 
 def test_a_failing_step_is_explained_with_the_message_of_the_fmu(oscillator: Fmu) -> None:

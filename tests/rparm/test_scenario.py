@@ -1,5 +1,6 @@
 """Reading of scenarios: what right files give, how they are found, a line for each mistake."""
 
+import dataclasses
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -10,7 +11,7 @@ import pytest
 
 from rparm import project
 from rparm.errors import UserError
-from rparm.fmi.fmu_file import CO_SIMULATION, INSTANCES, Fmu
+from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES, TOLERANCE
 from rparm.runs import scenario, simulation
 from rparm.runs import scenario as scenarios
@@ -335,26 +336,13 @@ def wheel(request: pytest.FixtureRequest) -> Iterator[Fmu]:
 INPUTS = "[inputs.speed]\nconstant = 3.0\n[inputs.is_counting]\n"
 
 
-def test_a_boolean_input_and_parameter_reach_the_fmu(
-    write, wheel: Fmu, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    counted: list[tuple[float, int]] = []
-    read = wheel.model.variables["turns"].reference
-    instance_class = INSTANCES[wheel.model.fmi_version, CO_SIMULATION]
-    do_step = instance_class.do_step
-
-    def step_and_read(self, start: float, length: float, goes_back: bool = False) -> None:
-        do_step(self, start, length, goes_back)
-        counted.append((start + length, self._integer(read)))
-
-    monkeypatch.setattr(instance_class, "do_step", step_and_read)
+def test_a_boolean_input_and_parameter_reach_the_fmu(write, wheel: Fmu) -> None:
     text = timed(0, 10, 1) + "[parameters]\nis_reversed = true\n" + INPUTS
     text += "table = [[0, false], [4, true], [7, false]]\n"
-    loaded = scenario.load(write(text), wheel.model)
-    monkeypatch.setattr(simulation, "_steps_made", 0)  # else the compiled loop may step
-    simulation.simulate(wheel, loaded)
-    assert [time for time, _ in counted] == list(range(1, 11))
-    for time, turns in counted:
+    loaded = dataclasses.replace(scenario.load(write(text), wheel.model), panels=(("turns",),))
+    result = simulation.simulate(wheel, loaded)
+    assert result.times.tolist() == list(range(11))
+    for time, turns in zip(result.times[1:], result.integers["turns"][1:], strict=True):
         expected = -np.floor(3.0 * time / (2 * np.pi)) if 4 < time <= 7 else 0
         assert turns == expected
 

@@ -1,8 +1,7 @@
-"""One run of an FMU by both loops, and FMUs that cannot be run."""
+"""One run of an FMU, and FMUs that cannot be run."""
 
 import re
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
@@ -11,14 +10,13 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-import rparm
 from rparm import files
 from rparm.console import Progress
 from rparm.errors import StoppedError, UserError
 from rparm.fmi.fmu_file import Fmu
+from rparm.loop import loop
 from rparm.runs import simulation
 from rparm.runs.scenario import Scenario
-from rparm.runs.simulation import Result
 from tests.support.rparm_project import (
     FMUS,
     LONG,
@@ -62,7 +60,7 @@ def test_instances_are_freed_whatever_happens(opened: Fmu, monkeypatch: pytest.M
             return original(self)
 
         monkeypatch.setattr(fmi2.FMU2Slave, name, counted)
-    monkeypatch.setattr(simulation, "PROGRESS_EVERY", 0.0)
+    monkeypatch.setattr(loop, "LOOK_EVERY", 0.0)
 
     def interrupt(_: int) -> None:
         raise KeyboardInterrupt
@@ -167,7 +165,7 @@ def test_fmu_with_a_binary_that_is_cut_off(fmu: Path, tmp_path: Path, kept: int)
     assert Path.cwd() == here
 
 
-# ---- The compiled loop ---------------------------------------------------------------------------
+# ---- The loop ------------------------------------------------------------------------------------
 
 
 both_versions = pytest.mark.parametrize("version", [2, 3])
@@ -177,42 +175,36 @@ def of_version(folder: str, version: int) -> Fmu:
     return Fmu(FMUS[folder] if version == 2 else fmi3_fmu(FMUS[folder]))
 
 
-@pytest.fixture(autouse=True)
-def which_loop(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """Names of the loops that ran."""
-    ran: list[str] = []
-    for name in ("_step_through", "_step_compiled"):
-        loop = getattr(simulation, name)
-
-        def named(*arguments: object, loop: Callable = loop, name: str = name) -> object:
-            ran.append(name)
-            return loop(*arguments)
-
-        monkeypatch.setattr(simulation, name, named)
-    monkeypatch.setattr(simulation, "_steps_made", 0)
-    return ran
-
-
-def assert_same(scenario: Scenario, plain: Fmu, compiled: Fmu) -> Result:
-    """Both loops make the same of a scenario; what it is."""
-    plain = simulation.simulate(plain, scenario, compiled=False)
-    fast = simulation.simulate(compiled, scenario, compiled=True)
-    assert plain.names == fast.names and plain.messages == fast.messages
-    for name in ("tolerance", "steps", "solver_steps", "solver_rhs_evaluations"):
-        assert getattr(plain, name) == getattr(fast, name)
-    assert plain.values.tobytes() == fast.values.tobytes()
-    assert plain.times.tobytes() == fast.times.tobytes() and not fast.integers
-    return fast
+def by_hand(fmu: Fmu, scenario: Scenario) -> np.ndarray:
+    """Return the rows of a scenario, each call made here."""
+    variables = fmu.model.variables
+    rows = []
+    with fmu.instance("by_hand") as instance:
+        simulation.initialize(instance, scenario, scenario.tolerance)
+        outputs = instance.reals(fmu.model.real_outputs)
+        outputs.get()
+        rows.append(outputs.view.copy())
+        for i, length in enumerate(np.diff(scenario.times)):
+            for name, values in scenario.inputs.items():
+                is_boolean = variables[name].type == "Boolean"
+                instance.set(name, bool(values[i]) if is_boolean else float(values[i]))
+            instance.do_step(scenario.times[i], length)
+            outputs.get()
+            rows.append(outputs.view.copy())
+    return np.array(rows)[scenario.reference_rows]
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_scenario_has_the_same_bits(name: str, which_loop: list[str]) -> None:
-    """In FMI 2.0 by the plain loop, and in FMI 3.0 by the compiled one."""
+def test_a_scenario_has_the_same_bits(name: str) -> None:
+    """In both versions of FMI, and by calls from Python."""
     scenario = replace(load(name), panels=())
     with of_version(scenario.model, 2) as fmu, of_version(scenario.model, 3) as other:
-        result = assert_same(scenario, fmu, other)
+        expected = by_hand(fmu, scenario)
+        result, newer = (simulation.simulate(x, scenario) for x in (fmu, other))
     assert len(result.values) == len(scenario.reference_rows)
-    assert which_loop == ["_step_through", "_step_compiled"]
+    assert result.values.tobytes() == newer.values.tobytes() == expected.tobytes()
+    for key in ("tolerance", "steps", "solver_steps", "solver_rhs_evaluations", "messages"):
+        assert getattr(result, key) == getattr(newer, key)
 
 
 @both_versions
@@ -220,23 +212,18 @@ def test_a_step_that_fails_keeps_the_rows_before_and_the_message(version: int) -
     scenario = replace(load("constant_effort"), reference_every=3)
     force = np.where(np.arange(len(scenario.times)) < 100, 1.0, 1e308)
     scenario = replace(scenario, inputs={**scenario.inputs, "f2": force})
+    gentle = replace(scenario, inputs={**scenario.inputs, "f2": np.ones_like(force)})
     with of_version("rp_manipulator", version) as fmu:
-        stopped = []
-        for compiled in (False, True):
-            with pytest.raises(StoppedError) as caught:
-                simulation.simulate(fmu, scenario, compiled=compiled)
-            stopped.append(caught.value)
-    plain, fast = stopped
-    assert str(plain) == str(fast) and "in the step from t = 1.0 s failed" in str(fast)
-    assert len(fast.result.times) == 34 and fast.result.solver_steps is None
-    assert plain.result.values.tobytes() == fast.result.values.tobytes()
+        with pytest.raises(StoppedError, match=r"in the step from t = 1\.0 s failed") as caught:
+            simulation.simulate(fmu, scenario)
+        expected = simulation.simulate(fmu, gentle)
+    stopped = caught.value.result
+    assert len(stopped.times) == 34 and stopped.solver_steps is None
+    assert stopped.values.tobytes() == expected.values[:34].tobytes()
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_progress_counts_all_steps_and_may_interrupt(
-    monkeypatch: pytest.MonkeyPatch, compiled: bool
-) -> None:
-    monkeypatch.setattr(simulation, "PROGRESS_EVERY", 0.0)
+def test_progress_counts_all_steps_and_may_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop, "LOOK_EVERY", 0.0)
     counted: list[int] = []
 
     def interrupt(_: int) -> NoReturn:
@@ -244,30 +231,7 @@ def test_progress_counts_all_steps_and_may_interrupt(
 
     with of_version("rp_manipulator", 2) as fmu:
         scenario = load("sine_efforts")
-        simulation.simulate(fmu, scenario, progress=counted.append, compiled=compiled)
+        simulation.simulate(fmu, scenario, progress=counted.append)
         assert sum(counted) == len(scenario.times) - 1 and len(counted) > 3
         with pytest.raises(KeyboardInterrupt):
-            simulation.simulate(fmu, scenario, progress=interrupt, compiled=compiled)
-        assert_same(scenario, fmu, fmu)
-
-
-def test_it_is_used_where_it_pays(monkeypatch: pytest.MonkeyPatch, which_loop: list[str]) -> None:
-    """After enough steps of one process, by programs at once, and never for drawn Integers."""
-    monkeypatch.setattr(simulation, "WORTH_COMPILING", 1200)
-    with of_version("rp_manipulator", 2) as fmu:
-        for _ in range(4):
-            simulation.simulate(fmu, load("constant_effort"))
-    rparm.Scenario("constant_effort").run()
-    rparm.simulate(FMUS["rp_manipulator"], stop_time=1.0, step=0.1)
-    with of_version("rp_plant", 2) as fmu:
-        assert simulation.simulate(fmu, load("stick_slip")).integers
-    plain, compiled = ["_step_through"], ["_step_compiled"]
-    assert which_loop == plain * 2 + compiled * 4 + plain
-
-
-def test_without_numba_the_plain_loop_runs(
-    monkeypatch: pytest.MonkeyPatch, which_loop: list[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "rparm.fmi.compiled_loop", None)
-    table = rparm.simulate(FMUS["rp_manipulator"], stop_time=1.0, step=0.1)
-    assert len(table["time"]) == 11 and which_loop == ["_step_through"]
+            simulation.simulate(fmu, scenario, progress=interrupt)

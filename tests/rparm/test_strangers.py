@@ -233,7 +233,7 @@ def test_an_exception_in_a_block_stays_what_it_is() -> None:
 def test_an_interrupt_that_was_caught_does_not_set_the_exit_code(tmp_path: Path) -> None:
     (tmp_path / "interrupted.py").write_text(
         "from rparm import __main__ as program\n"
-        "try: exec('raise KeyboardInterrupt')\n"  # as where numba is imported
+        "try: exec('raise KeyboardInterrupt')\n"
         "except KeyboardInterrupt: program._end(130)\n"
     )
     assert python("-m", "interrupted", folder=tmp_path).returncode == 130

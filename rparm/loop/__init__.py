@@ -1,0 +1,1 @@
+"""The loop that steps FMUs, in C, and how Python runs it."""

@@ -1,0 +1,192 @@
+#include "fmu_calls.h"
+
+#include "fmi2FunctionTypes.h"
+#include "fmi3FunctionTypes.h"
+
+/* The function of a type that FMI declares; notes which is called. */
+#define FUNCTION(fmu, name, type) ((type *)(fmu)->functions[(fmu)->called = (name)])
+
+static int done(const struct fmu *fmu, int status) {
+    return fmu->raised != NULL && *fmu->raised ? FMU_RAISED : status;
+}
+
+/* True if variables are in memory; some that are only read need not be. */
+static bool are_in_memory(const struct fmu *fmu, int64_t count, const uint32_t references[]) {
+    bool are_in = fmu->memory != NULL;
+    for (int64_t i = 0; are_in && i < count; i++) {
+        are_in = references[i] < fmu->memory_count;
+    }
+    return are_in;
+}
+
+int fmu_set_reals(struct fmu *fmu, int64_t count, const uint32_t references[],
+                  const double values[]) {
+    const size_t n = (size_t)count;
+    if (are_in_memory(fmu, count, references)) {
+        for (int64_t i = 0; i < count; i++) {
+            fmu->memory[references[i]] = values[i];
+        }
+        return FMU_OK;
+    }
+    if (n == 0) {
+        return FMU_OK;
+    }
+    if (fmu->version == 2) {
+        fmi2SetRealTYPE *const set = FUNCTION(fmu, FMU_SET_REAL, fmi2SetRealTYPE);
+        return done(fmu, set(fmu->instance, references, n, values));
+    }
+    fmi3SetFloat64TYPE *const set = FUNCTION(fmu, FMU_SET_REAL, fmi3SetFloat64TYPE);
+    return done(fmu, set(fmu->instance, references, n, values, n));
+}
+
+int fmu_get_reals(struct fmu *fmu, int64_t count, const uint32_t references[], double values[]) {
+    const size_t n = (size_t)count;
+    if (are_in_memory(fmu, count, references)) {
+        for (int64_t i = 0; i < count; i++) {
+            values[i] = fmu->memory[references[i]];
+        }
+        return FMU_OK;
+    }
+    if (n == 0) {
+        return FMU_OK;
+    }
+    if (fmu->version == 2) {
+        fmi2GetRealTYPE *const get = FUNCTION(fmu, FMU_GET_REAL, fmi2GetRealTYPE);
+        return done(fmu, get(fmu->instance, references, n, values));
+    }
+    fmi3GetFloat64TYPE *const get = FUNCTION(fmu, FMU_GET_REAL, fmi3GetFloat64TYPE);
+    return done(fmu, get(fmu->instance, references, n, values, n));
+}
+
+/* ---- Discrete variables --------------------------------------------------------------------- */
+
+static int set_discrete_2(struct fmu *fmu, struct fmu_variable variable, int64_t value) {
+    if (variable.type == FMU_BOOLEAN) {
+        const fmi2Boolean given = value != 0;
+        fmi2SetBooleanTYPE *const set = FUNCTION(fmu, FMU_SET_BOOLEAN, fmi2SetBooleanTYPE);
+        return set(fmu->instance, &variable.reference, 1, &given);
+    }
+    const fmi2Integer given = (fmi2Integer)value;
+    fmi2SetIntegerTYPE *const set = FUNCTION(fmu, FMU_SET_INTEGER, fmi2SetIntegerTYPE);
+    return set(fmu->instance, &variable.reference, 1, &given);
+}
+
+static int set_discrete_3(struct fmu *fmu, struct fmu_variable variable, int64_t value) {
+    if (variable.type == FMU_BOOLEAN) {
+        const fmi3Boolean given = value != 0;
+        fmi3SetBooleanTYPE *const set = FUNCTION(fmu, FMU_SET_BOOLEAN, fmi3SetBooleanTYPE);
+        return set(fmu->instance, &variable.reference, 1, &given, 1);
+    }
+    if (variable.type == FMU_INTEGER) {
+        const fmi3Int32 given = (fmi3Int32)value;
+        fmi3SetInt32TYPE *const set = FUNCTION(fmu, FMU_SET_INTEGER, fmi3SetInt32TYPE);
+        return set(fmu->instance, &variable.reference, 1, &given, 1);
+    }
+    fmi3SetInt64TYPE *const set = FUNCTION(fmu, FMU_SET_ENUMERATION, fmi3SetInt64TYPE);
+    return set(fmu->instance, &variable.reference, 1, &value, 1);
+}
+
+int fmu_set_discrete(struct fmu *fmu, struct fmu_variable variable, int64_t value) {
+    const bool is_2 = fmu->version == 2;
+    return done(fmu,
+                is_2 ? set_discrete_2(fmu, variable, value) : set_discrete_3(fmu, variable, value));
+}
+
+static int get_discrete_2(struct fmu *fmu, struct fmu_variable variable, int64_t *value) {
+    int found = 0; /* fmi2Boolean and fmi2Integer are int */
+    int status;
+    if (variable.type == FMU_BOOLEAN) {
+        fmi2GetBooleanTYPE *const get = FUNCTION(fmu, FMU_GET_BOOLEAN, fmi2GetBooleanTYPE);
+        status = get(fmu->instance, &variable.reference, 1, &found);
+    } else {
+        fmi2GetIntegerTYPE *const get = FUNCTION(fmu, FMU_GET_INTEGER, fmi2GetIntegerTYPE);
+        status = get(fmu->instance, &variable.reference, 1, &found);
+    }
+    *value = found;
+    return status;
+}
+
+static int get_discrete_3(struct fmu *fmu, struct fmu_variable variable, int64_t *value) {
+    int status;
+    if (variable.type == FMU_BOOLEAN) {
+        fmi3Boolean found = false;
+        fmi3GetBooleanTYPE *const get = FUNCTION(fmu, FMU_GET_BOOLEAN, fmi3GetBooleanTYPE);
+        status = get(fmu->instance, &variable.reference, 1, &found, 1);
+        *value = found;
+    } else if (variable.type == FMU_INTEGER) {
+        fmi3Int32 found = 0;
+        fmi3GetInt32TYPE *const get = FUNCTION(fmu, FMU_GET_INTEGER, fmi3GetInt32TYPE);
+        status = get(fmu->instance, &variable.reference, 1, &found, 1);
+        *value = found;
+    } else {
+        fmi3GetInt64TYPE *const get = FUNCTION(fmu, FMU_GET_ENUMERATION, fmi3GetInt64TYPE);
+        status = get(fmu->instance, &variable.reference, 1, value, 1);
+    }
+    return status;
+}
+
+int fmu_get_discrete(struct fmu *fmu, struct fmu_variable variable, int64_t *value) {
+    const bool is_2 = fmu->version == 2;
+    return done(fmu,
+                is_2 ? get_discrete_2(fmu, variable, value) : get_discrete_3(fmu, variable, value));
+}
+
+/* ---- Derivatives ---------------------------------------------------------------------------- */
+
+int fmu_set_slopes(struct fmu *fmu, int64_t count, const uint32_t references[],
+                   const int32_t orders[], const double slopes[]) {
+    if (count == 0) {
+        return FMU_OK;
+    }
+    fmi2SetRealInputDerivativesTYPE *const set =
+        FUNCTION(fmu, FMU_SET_INPUT_DERIVATIVES, fmi2SetRealInputDerivativesTYPE);
+    return done(fmu, set(fmu->instance, references, (size_t)count, orders, slopes));
+}
+
+int fmu_get_slopes(struct fmu *fmu, int64_t count, const uint32_t references[],
+                   const int32_t orders[], double slopes[]) {
+    const size_t n = (size_t)count;
+    if (n == 0) {
+        return FMU_OK;
+    }
+    if (fmu->version == 2) {
+        fmi2GetRealOutputDerivativesTYPE *const get =
+            FUNCTION(fmu, FMU_GET_OUTPUT_DERIVATIVES, fmi2GetRealOutputDerivativesTYPE);
+        return done(fmu, get(fmu->instance, references, n, orders, slopes));
+    }
+    fmi3GetOutputDerivativesTYPE *const get =
+        FUNCTION(fmu, FMU_GET_OUTPUT_DERIVATIVES, fmi3GetOutputDerivativesTYPE);
+    return done(fmu, get(fmu->instance, references, n, orders, slopes, n));
+}
+
+int fmu_get_derivative(struct fmu *fmu, int64_t count, const uint32_t unknowns[],
+                       const uint32_t knowns[], const double direction[], double result[]) {
+    const size_t n = (size_t)count;
+    if (fmu->version == 2) {
+        fmi2GetDirectionalDerivativeTYPE *const get =
+            FUNCTION(fmu, FMU_GET_DIRECTIONAL_DERIVATIVE, fmi2GetDirectionalDerivativeTYPE);
+        return done(fmu, get(fmu->instance, unknowns, n, knowns, n, direction, result));
+    }
+    fmi3GetDirectionalDerivativeTYPE *const get =
+        FUNCTION(fmu, FMU_GET_DIRECTIONAL_DERIVATIVE, fmi3GetDirectionalDerivativeTYPE);
+    return done(fmu, get(fmu->instance, unknowns, n, knowns, n, direction, n, result, n));
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+int fmu_do_step(struct fmu *fmu, double time, double length, bool is_final) {
+    if (fmu->step_start != NULL) {
+        *fmu->step_start = time;
+    }
+    if (fmu->version == 2) {
+        fmi2DoStepTYPE *const step = FUNCTION(fmu, FMU_DO_STEP, fmi2DoStepTYPE);
+        return done(fmu, step(fmu->instance, time, length, is_final));
+    }
+    fmi3Boolean has_event = false;
+    fmi3Boolean terminates = false;
+    fmi3Boolean is_early = false;
+    fmi3DoStepTYPE *const step = FUNCTION(fmu, FMU_DO_STEP, fmi3DoStepTYPE);
+    const int status = done(fmu, step(fmu->instance, time, length, is_final, &has_event,
+                                      &terminates, &is_early, &fmu->reached));
+    return status < FMU_DISCARD && terminates ? FMU_ENDED : status;
+}
