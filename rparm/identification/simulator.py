@@ -171,8 +171,7 @@ class _Runner:
         loop = self._loop
         rows = np.empty((len(segment.times), loop.width))
         rows[0] = loop.values[: loop.width]
-        scheduled = segment.switches[1:].astype(np.int64)
-        loop.run(segment.times[1:], segment.inputs[1:], scheduled, rows)
+        loop.run(segment.times[1:], segment.inputs[1:], segment.switches[1:], rows)
         return rows
 
 

@@ -26,6 +26,7 @@ enum fmu_function {
 enum {
     FMU_OK = 0,
     FMU_DISCARD = 2,
+    FMU_ERROR = 3,
     FMU_ENDED = 100,  /* the FMU asks to end the simulation; reached says when */
     FMU_RAISED = 101, /* a function of the host has failed within the call */
 };
@@ -37,7 +38,7 @@ enum fmu_type { FMU_BOOLEAN, FMU_INTEGER, FMU_ENUMERATION };
  * are set and read there. */
 struct fmu {
     void *instance;
-    void (*functions[FMU_FUNCTION_COUNT])(void); /* NULL if not there or not called */
+    void (*functions[FMU_FUNCTION_COUNT])(void); /* loop_missing if not there */
     double *step_start;                          /* s, of the present step; NULL: nobody asks */
     const int32_t *raised;                       /* not 0: FMU_RAISED; NULL: never */
     double reached;                              /* s, when FMU_ENDED */

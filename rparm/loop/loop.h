@@ -163,5 +163,8 @@ LOOP_API int loop_read_row(struct loop *loop, double row[]);
  * 0, -1 after a failure. */
 LOOP_API int loop_follow_slopes(struct loop *loop);
 
+/* In place of a function that an FMU lacks: returns FMI's status of an error. */
+LOOP_API int loop_missing(void);
+
 /* Returns the size of a structure, in the order of declaration here, for the host to compare. */
 LOOP_API int64_t loop_size(int number);

@@ -121,8 +121,9 @@ class Component:
         calls.instance = pointed if isinstance(pointed, int) else pointed.value
         calls.version = int(instance.fmu.model.fmi_version[0])
         for i, name in enumerate(function_names(instance)):
-            if name and hasattr(library, name):
-                calls.functions[i] = cast(getattr(library, name), c_void_p).value
+            own = bool(name) and hasattr(library, name)
+            function = getattr(library, name) if own else structures.library().loop_missing
+            calls.functions[i] = cast(function, c_void_p).value
         if instance.memory is not None:
             calls.memory, calls.memory_count = instance.memory.ctypes.data, len(instance.memory)
         if instance.step_start is not None:
@@ -192,8 +193,6 @@ class Loop:
     ----------
     state : LoopState
         What loop.h explains; flags are set there.
-    switches : sequence of (source, target) names
-        Of discrete inputs: ``component.variable`` of the target.
     done : int
         Steps of the last call of `run` that did not fail.
     """
@@ -349,18 +348,21 @@ class Loop:
         progress : callable
             Gets the number of steps since its last call.
         """
+        ends = np.ascontiguousarray(ends, float)
+        given = {"ends": ends} | ({} if growth is None else {"growth": growth})
+        for name, array, kind in (
+            ("driven", driven, float), ("scheduled", scheduled, np.int64),
+            ("has_row", has_row, bool),
+        ):  # fmt: skip
+            if array is not None:
+                given[name] = np.ascontiguousarray(array, kind)
         counts = None if has_row is None else np.cumsum(has_row)
         self.done, count = 0, FIRST_STEPS
         while self.done < len(ends):
             first, begin = self.done, time.perf_counter()
             here = slice(first, first + count)
             run = Run(count=len(ends[here]))
-            run.point(ends=ends[here])
-            for name, array in {
-                "driven": driven, "scheduled": scheduled, "has_row": has_row, "growth": growth,
-            }.items():  # fmt: skip
-                if array is not None:
-                    run.point(**{name: array[here]})
+            run.point(**{name: array[here] for name, array in given.items()})
             if rows is not None:
                 made = first if counts is None or not first else counts[first - 1]
                 run.point(rows=rows[1 + made :])
