@@ -332,7 +332,7 @@ def loop_library() -> Path:
     suffix = {"windows": ".dll", "darwin": ".dylib"}.get(platform_name().split("-")[1], ".so")
     if INSTALLED:
         return ROOT / "loop" / platform_name() / f"loop{suffix}"
-    return ROOT / "build" / "loop" / f"loop{suffix}"
+    return PACKAGE.parent / "build" / "loop" / f"loop{suffix}"
 
 
 def built_for_all() -> Path:

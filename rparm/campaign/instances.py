@@ -11,7 +11,7 @@ from rparm.campaign.job import Job, Target
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from rparm.loop.loop import Tangent, one_component
+from rparm.fmi.loop import Tangent, one_component
 from rparm.systems.master import Master, in_order
 from rparm.systems.structure import WAYS, split
 

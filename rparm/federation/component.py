@@ -20,9 +20,9 @@ from rparm.errors import UserError
 from rparm.federation.network import Federate, mute_libraries
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.loop import check_finite
 from rparm.fmi.model import Value
 from rparm.interruption import ENDINGS
-from rparm.loop.loop import check_finite
 from rparm.systems.connected_instance import begin_instance
 from rparm.systems.master import beyond_steps
 from rparm.systems.structure import Connection, OpenedSystem

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
-from ctypes import Array, byref, c_double, c_int, c_int32, c_uint, c_void_p
+from ctypes import Array, byref, c_double, c_int, c_uint, c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
@@ -20,6 +20,7 @@ from fmpy.fmi1 import FMICallException
 
 from rparm.errors import UserError, one_line
 from rparm.fmi.model import Model, Value
+from rparm.loop.structures import Polynomials
 from rparm.project import check_current_folder
 
 OK, DISCARD, ERROR, FATAL = 0, 2, 3, 4  # from DISCARD on, a status stops a run
@@ -105,9 +106,7 @@ class Instance(ABC):
     SETTERS: ClassVar[Mapping[str, str]]  # methods of LIBRARY, by type of the variable
     MARKS: ClassVar[str]  # regular expression of marks in messages that do not stand for themselves
 
-    # of an FMU that asks for inputs within a step
-    step_start: c_double | None = None  # s, of the present step
-    has_raised: c_int32 | None = None  # 1 if that has failed
+    polynomials: Polynomials | None = None  # of inputs, if the FMU asks for them within a step
     # of what runs like an FMU: Real variables by their value references, not all of them perhaps
     memory: np.ndarray | None = None
 

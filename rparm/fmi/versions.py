@@ -4,11 +4,12 @@ Masters here use neither event mode nor early return of FMI 3.0. Instances for m
 initialized and read, not integrated: what an FMU answers at one time, either kind answers.
 """
 
-import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from ctypes import POINTER, Array, byref, c_double, c_int32, sizeof
+from ctypes import POINTER, Array, byref, c_double, c_void_p, cast, sizeof
 from functools import partial
+from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -26,6 +27,7 @@ from rparm.fmi.fmi_instance import (
     UnpackedFmu,
     doubles,
 )
+from rparm.loop.structures import Host, Polynomials, library
 
 # Without them FMUs send errors only. They cost nothing as long as all is well.
 LOGGED = ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal")
@@ -146,17 +148,25 @@ class Fmi3Instance(Instance):
     }
 
     def _instantiate(self) -> None:
-        fmi, smooth = self.fmi, bool(self.smooth_inputs)
-        fmi.instantiate(
-            logMessage=self._log,
-            intermediateUpdate=self._update if smooth else None,
-            requiredIntermediateVariables=self._references(self.smooth_inputs) if smooth else None,
-        )
-        self._log_warnings()
-        self._inputs: Callable[[float], object] | None = None  # sets them at a time in a step, s
-        self.step_start = c_double()
+        fmi = self.fmi
+        self.polynomials = Polynomials(order=-1)
         self._raised: BaseException | None = None  # in a callback, where it would be lost
-        self.has_raised = c_int32()
+        fmi.logMessage = fmi3.fmi3LogMessageCallback(self._log)
+        update = fmi3.fmi3IntermediateUpdateCallback()
+        if self.smooth_inputs:
+            update = cast(library().loop_update_inputs, fmi3.fmi3IntermediateUpdateCallback)
+        required = self._references(self.smooth_inputs)
+        environment = cast(byref(self.polynomials), c_void_p)
+        fmi.component = fmi.fmi3InstantiateCoSimulation(
+            fmi.instanceName.encode(), fmi.guid.encode(),
+            f"{Path(fmi.unzipDirectory, 'resources')}{os.sep}".encode(), False, False, False, False,
+            required, len(required), environment, fmi.logMessage, update,
+        )  # fmt: skip
+        if not fmi.component:
+            raise Exception  # as fmpy does; Instance says what the FMU has said
+        self.polynomials.instance = fmi.component
+        self.polynomials.set = cast(fmi.dll.fmi3SetFloat64, c_void_p)
+        self._log_warnings()
 
         # results of a step
         self._terminates = fmi3.fmi3Boolean()
@@ -195,19 +205,20 @@ class Fmi3Instance(Instance):
         return partial(self.fmi.fmi3GetOutputDerivatives, *arguments)
 
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
-        coefficients = np.zeros((order + 1, len(names)))
-        inputs, powers = self.reals(names), np.arange(order + 1)
-        factorials = np.array([math.factorial(power) for power in powers], dtype=float)
-
-        def set_in_step(time: float) -> None:
-            elapsed = time - self.step_start.value
-            inputs.view[:] = elapsed**powers / factorials @ coefficients
-            inputs.set()
+        coefficients, inputs = np.zeros((order + 1, len(names))), self.reals(names)
+        assert self.polynomials is not None
+        self.polynomials.count = len(names)
+        self.polynomials.order = order if order else -1  # then they hold without being asked for
+        self.polynomials.point(
+            references=np.array(self._references(names), np.uint32),
+            coefficients=coefficients,
+            values=inputs.view,
+        )
 
         def set_all() -> None:
-            set_in_step(self.step_start.value)
+            inputs.view[:] = coefficients[0]
+            inputs.set()
 
-        self._inputs = set_in_step if order else None
         return InputPolynomials(coefficients, set_all)
 
     def input_functions(
@@ -216,34 +227,35 @@ class Fmi3Instance(Instance):
         """Let Real inputs, of `smooth_inputs`, be functions of time (s) in all further steps."""
         inputs = self.reals(names)
 
-        def set_in_step(time: float) -> None:
-            inputs.view[:] = values(time)
-            inputs.set()
+        def set_in_step(time: float) -> int:
+            try:
+                inputs.view[:] = values(time)
+                inputs.set()
+            except BaseException as error:  # Ctrl-C, too
+                self._raised = error
+                return 1
+            return 0
 
-        self._inputs = set_in_step
-
-    def _update(self, _environment: int, time: float, set_requested: bool, *_: object) -> None:
-        """Set the inputs: the FMU calls this within a step."""
-        if not set_requested or self._inputs is None:
-            return
-        try:
-            self._inputs(time)
-        except BaseException as error:  # Ctrl-C, too
-            self._raised, self.has_raised.value = error, True
+        assert self.polynomials is not None
+        self.polynomials.order, self.polynomials.host = -1, Host(set_in_step)
 
     def raised(self) -> BaseException:
-        assert self._raised is not None
-        error, self._raised, self.has_raised.value = self._raised, None, False
+        assert self._raised is not None and self.polynomials is not None
+        error, self._raised, self.polynomials.status = self._raised, None, 0
         return error
 
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
         final = fmi3.fmi3False if goes_back else fmi3.fmi3True
-        self.step_start.value = start
+        assert self.polynomials is not None
+        self.polynomials.start = start
         try:
             self.fmi.fmi3DoStep(self.fmi.component, start, length, final, *self._results)
         finally:
             if self._raised is not None:
                 raise self.raised()
+        if status := self.polynomials.status:
+            self.polynomials.status = 0
+            raise FMICallException("fmi3SetFloat64", status)
         if self._terminates.value:
             raise self.ended(f"at t = {self._time.value!r} s")
 

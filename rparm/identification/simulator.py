@@ -14,10 +14,10 @@ import numpy as np
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance, Reals
 from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.loop import one_component
 from rparm.fmi.model import ARE_EXACT, INITIAL, Value, gradient_name
 from rparm.identification.logs import Segment
 from rparm.identification.request import Parameters
-from rparm.loop.loop import one_component
 
 Task, Answer = TypeVar("Task"), TypeVar("Answer")
 CORES = os.cpu_count() or 1

@@ -1,1 +1,1 @@
-"""The loop that steps FMUs, in C, and how Python runs it."""
+"""The loop that steps FMUs, in C, and its structures in Python."""

@@ -6,10 +6,6 @@
 /* The function of a type that FMI declares; notes which is called. */
 #define FUNCTION(fmu, name, type) ((type *)(fmu)->functions[(fmu)->called = (name)])
 
-static int done(const struct fmu *fmu, int status) {
-    return fmu->raised != NULL && *fmu->raised ? FMU_RAISED : status;
-}
-
 /* True if variables are in memory; some that are only read need not be. */
 static bool are_in_memory(const struct fmu *fmu, int64_t count, const uint32_t references[]) {
     bool are_in = fmu->memory != NULL;
@@ -33,10 +29,10 @@ int fmu_set_reals(struct fmu *fmu, int64_t count, const uint32_t references[],
     }
     if (fmu->version == 2) {
         fmi2SetRealTYPE *const set = FUNCTION(fmu, FMU_SET_REAL, fmi2SetRealTYPE);
-        return done(fmu, set(fmu->instance, references, n, values));
+        return (int)set(fmu->instance, references, n, values);
     }
     fmi3SetFloat64TYPE *const set = FUNCTION(fmu, FMU_SET_REAL, fmi3SetFloat64TYPE);
-    return done(fmu, set(fmu->instance, references, n, values, n));
+    return (int)set(fmu->instance, references, n, values, n);
 }
 
 int fmu_get_reals(struct fmu *fmu, int64_t count, const uint32_t references[], double values[]) {
@@ -52,10 +48,10 @@ int fmu_get_reals(struct fmu *fmu, int64_t count, const uint32_t references[], d
     }
     if (fmu->version == 2) {
         fmi2GetRealTYPE *const get = FUNCTION(fmu, FMU_GET_REAL, fmi2GetRealTYPE);
-        return done(fmu, get(fmu->instance, references, n, values));
+        return (int)get(fmu->instance, references, n, values);
     }
     fmi3GetFloat64TYPE *const get = FUNCTION(fmu, FMU_GET_REAL, fmi3GetFloat64TYPE);
-    return done(fmu, get(fmu->instance, references, n, values, n));
+    return (int)get(fmu->instance, references, n, values, n);
 }
 
 /* ---- Discrete variables --------------------------------------------------------------------- */
@@ -64,32 +60,31 @@ static int set_discrete_2(struct fmu *fmu, struct fmu_variable variable, int64_t
     if (variable.type == FMU_BOOLEAN) {
         const fmi2Boolean given = value != 0;
         fmi2SetBooleanTYPE *const set = FUNCTION(fmu, FMU_SET_BOOLEAN, fmi2SetBooleanTYPE);
-        return set(fmu->instance, &variable.reference, 1, &given);
+        return (int)set(fmu->instance, &variable.reference, 1, &given);
     }
     const fmi2Integer given = (fmi2Integer)value;
     fmi2SetIntegerTYPE *const set = FUNCTION(fmu, FMU_SET_INTEGER, fmi2SetIntegerTYPE);
-    return set(fmu->instance, &variable.reference, 1, &given);
+    return (int)set(fmu->instance, &variable.reference, 1, &given);
 }
 
 static int set_discrete_3(struct fmu *fmu, struct fmu_variable variable, int64_t value) {
     if (variable.type == FMU_BOOLEAN) {
         const fmi3Boolean given = value != 0;
         fmi3SetBooleanTYPE *const set = FUNCTION(fmu, FMU_SET_BOOLEAN, fmi3SetBooleanTYPE);
-        return set(fmu->instance, &variable.reference, 1, &given, 1);
+        return (int)set(fmu->instance, &variable.reference, 1, &given, 1);
     }
     if (variable.type == FMU_INTEGER) {
         const fmi3Int32 given = (fmi3Int32)value;
         fmi3SetInt32TYPE *const set = FUNCTION(fmu, FMU_SET_INTEGER, fmi3SetInt32TYPE);
-        return set(fmu->instance, &variable.reference, 1, &given, 1);
+        return (int)set(fmu->instance, &variable.reference, 1, &given, 1);
     }
     fmi3SetInt64TYPE *const set = FUNCTION(fmu, FMU_SET_ENUMERATION, fmi3SetInt64TYPE);
-    return set(fmu->instance, &variable.reference, 1, &value, 1);
+    return (int)set(fmu->instance, &variable.reference, 1, &value, 1);
 }
 
 int fmu_set_discrete(struct fmu *fmu, struct fmu_variable variable, int64_t value) {
     const bool is_2 = fmu->version == 2;
-    return done(fmu,
-                is_2 ? set_discrete_2(fmu, variable, value) : set_discrete_3(fmu, variable, value));
+    return is_2 ? set_discrete_2(fmu, variable, value) : set_discrete_3(fmu, variable, value);
 }
 
 static int get_discrete_2(struct fmu *fmu, struct fmu_variable variable, int64_t *value) {
@@ -97,10 +92,10 @@ static int get_discrete_2(struct fmu *fmu, struct fmu_variable variable, int64_t
     int status;
     if (variable.type == FMU_BOOLEAN) {
         fmi2GetBooleanTYPE *const get = FUNCTION(fmu, FMU_GET_BOOLEAN, fmi2GetBooleanTYPE);
-        status = get(fmu->instance, &variable.reference, 1, &found);
+        status = (int)get(fmu->instance, &variable.reference, 1, &found);
     } else {
         fmi2GetIntegerTYPE *const get = FUNCTION(fmu, FMU_GET_INTEGER, fmi2GetIntegerTYPE);
-        status = get(fmu->instance, &variable.reference, 1, &found);
+        status = (int)get(fmu->instance, &variable.reference, 1, &found);
     }
     *value = found;
     return status;
@@ -111,24 +106,23 @@ static int get_discrete_3(struct fmu *fmu, struct fmu_variable variable, int64_t
     if (variable.type == FMU_BOOLEAN) {
         fmi3Boolean found = false;
         fmi3GetBooleanTYPE *const get = FUNCTION(fmu, FMU_GET_BOOLEAN, fmi3GetBooleanTYPE);
-        status = get(fmu->instance, &variable.reference, 1, &found, 1);
+        status = (int)get(fmu->instance, &variable.reference, 1, &found, 1);
         *value = found;
     } else if (variable.type == FMU_INTEGER) {
         fmi3Int32 found = 0;
         fmi3GetInt32TYPE *const get = FUNCTION(fmu, FMU_GET_INTEGER, fmi3GetInt32TYPE);
-        status = get(fmu->instance, &variable.reference, 1, &found, 1);
+        status = (int)get(fmu->instance, &variable.reference, 1, &found, 1);
         *value = found;
     } else {
         fmi3GetInt64TYPE *const get = FUNCTION(fmu, FMU_GET_ENUMERATION, fmi3GetInt64TYPE);
-        status = get(fmu->instance, &variable.reference, 1, value, 1);
+        status = (int)get(fmu->instance, &variable.reference, 1, value, 1);
     }
     return status;
 }
 
 int fmu_get_discrete(struct fmu *fmu, struct fmu_variable variable, int64_t *value) {
     const bool is_2 = fmu->version == 2;
-    return done(fmu,
-                is_2 ? get_discrete_2(fmu, variable, value) : get_discrete_3(fmu, variable, value));
+    return is_2 ? get_discrete_2(fmu, variable, value) : get_discrete_3(fmu, variable, value);
 }
 
 /* ---- Derivatives ---------------------------------------------------------------------------- */
@@ -140,7 +134,7 @@ int fmu_set_slopes(struct fmu *fmu, int64_t count, const uint32_t references[],
     }
     fmi2SetRealInputDerivativesTYPE *const set =
         FUNCTION(fmu, FMU_SET_INPUT_DERIVATIVES, fmi2SetRealInputDerivativesTYPE);
-    return done(fmu, set(fmu->instance, references, (size_t)count, orders, slopes));
+    return (int)set(fmu->instance, references, (size_t)count, orders, slopes);
 }
 
 int fmu_get_slopes(struct fmu *fmu, int64_t count, const uint32_t references[],
@@ -152,11 +146,11 @@ int fmu_get_slopes(struct fmu *fmu, int64_t count, const uint32_t references[],
     if (fmu->version == 2) {
         fmi2GetRealOutputDerivativesTYPE *const get =
             FUNCTION(fmu, FMU_GET_OUTPUT_DERIVATIVES, fmi2GetRealOutputDerivativesTYPE);
-        return done(fmu, get(fmu->instance, references, n, orders, slopes));
+        return (int)get(fmu->instance, references, n, orders, slopes);
     }
     fmi3GetOutputDerivativesTYPE *const get =
         FUNCTION(fmu, FMU_GET_OUTPUT_DERIVATIVES, fmi3GetOutputDerivativesTYPE);
-    return done(fmu, get(fmu->instance, references, n, orders, slopes, n));
+    return (int)get(fmu->instance, references, n, orders, slopes, n);
 }
 
 int fmu_get_derivative(struct fmu *fmu, int64_t count, const uint32_t unknowns[],
@@ -165,28 +159,68 @@ int fmu_get_derivative(struct fmu *fmu, int64_t count, const uint32_t unknowns[]
     if (fmu->version == 2) {
         fmi2GetDirectionalDerivativeTYPE *const get =
             FUNCTION(fmu, FMU_GET_DIRECTIONAL_DERIVATIVE, fmi2GetDirectionalDerivativeTYPE);
-        return done(fmu, get(fmu->instance, unknowns, n, knowns, n, direction, result));
+        return (int)get(fmu->instance, unknowns, n, knowns, n, direction, result);
     }
     fmi3GetDirectionalDerivativeTYPE *const get =
         FUNCTION(fmu, FMU_GET_DIRECTIONAL_DERIVATIVE, fmi3GetDirectionalDerivativeTYPE);
-    return done(fmu, get(fmu->instance, unknowns, n, knowns, n, direction, n, result, n));
+    return (int)get(fmu->instance, unknowns, n, knowns, n, direction, n, result, n);
 }
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
+void loop_update_inputs(void *environment, double time, bool sets, bool gets, bool finished,
+                        bool may_return, bool *returns, double *return_time) {
+    struct fmu_polynomials *const p = environment;
+    if (!sets || p == NULL || p->status != FMU_OK) {
+        return;
+    }
+    if (p->order < 0) {
+        p->status = p->host != NULL && p->host(time) ? FMU_RAISED : FMU_OK;
+        return;
+    }
+    const double elapsed = time - p->start;
+    for (int64_t i = 0; i < p->count; i++) {
+        double power = 1.0; /* over the factorial */
+        p->values[i] = p->coefficients[i];
+        for (int64_t k = 1; k <= p->order; k++) {
+            power *= elapsed / (double)k;
+            p->values[i] += power * p->coefficients[k * p->count + i];
+        }
+    }
+    fmi3SetFloat64TYPE *const set = (fmi3SetFloat64TYPE *)p->set;
+    const size_t n = (size_t)p->count;
+    const int status = (int)set(p->instance, p->references, n, p->values, n);
+    p->status = status < FMU_DISCARD ? FMU_OK : status;
+}
+
+/* Returns the status of a step, or of the inputs that were set within it. */
+static int with_inputs(struct fmu *fmu, int status) {
+    struct fmu_polynomials *const p = fmu->polynomials;
+    if (p == NULL || p->status == FMU_OK) {
+        return status;
+    }
+    const int found = p->status;
+    if (found != FMU_RAISED) { /* the host clears that */
+        p->status = FMU_OK;
+        fmu->called = FMU_SET_REAL;
+    }
+    return found;
+}
+
 int fmu_do_step(struct fmu *fmu, double time, double length, bool is_final) {
-    if (fmu->step_start != NULL) {
-        *fmu->step_start = time;
+    if (fmu->polynomials != NULL) {
+        fmu->polynomials->start = time;
     }
     if (fmu->version == 2) {
         fmi2DoStepTYPE *const step = FUNCTION(fmu, FMU_DO_STEP, fmi2DoStepTYPE);
-        return done(fmu, step(fmu->instance, time, length, is_final));
+        return (int)step(fmu->instance, time, length, is_final);
     }
     fmi3Boolean has_event = false;
     fmi3Boolean terminates = false;
     fmi3Boolean is_early = false;
     fmi3DoStepTYPE *const step = FUNCTION(fmu, FMU_DO_STEP, fmi3DoStepTYPE);
-    const int status = done(fmu, step(fmu->instance, time, length, is_final, &has_event,
-                                      &terminates, &is_early, &fmu->reached));
+    int status = (int)step(fmu->instance, time, length, is_final, &has_event, &terminates,
+                           &is_early, &fmu->reached);
+    status = with_inputs(fmu, status);
     return status < FMU_DISCARD && terminates ? FMU_ENDED : status;
 }

@@ -34,13 +34,27 @@ enum {
 /* Types of discrete variables. */
 enum fmu_type { FMU_BOOLEAN, FMU_INTEGER, FMU_ENUMERATION };
 
+/* Inputs that an FMU of FMI 3.0 asks for within its steps: polynomials of the time since the step
+ * began, or functions of the host. It is the environment of the instance. */
+struct fmu_polynomials {
+    void *instance;
+    void (*set)(void); /* fmi3SetFloat64 */
+    int64_t count;
+    const uint32_t *references;
+    int64_t order;              /* -1: no polynomials, the host sets inputs */
+    const double *coefficients; /* [order + 1][count] values at the beginning, then derivatives */
+    double *values;             /* [count] */
+    int (*host)(double time);   /* sets inputs at a time, s; returns not 0 if that fails; or NULL */
+    double start;               /* s, of the present step */
+    int32_t status;             /* of a call that has failed, or FMU_RAISED; else 0 */
+};
+
 /* What runs like an FMU may keep its Real variables in memory, by their value references: then they
  * are set and read there. */
 struct fmu {
     void *instance;
     void (*functions[FMU_FUNCTION_COUNT])(void); /* loop_missing if not there */
-    double *step_start;                          /* s, of the present step; NULL: nobody asks */
-    const int32_t *raised;                       /* not 0: FMU_RAISED; NULL: never */
+    struct fmu_polynomials *polynomials;         /* NULL: the FMU asks for no inputs */
     double reached;                              /* s, when FMU_ENDED */
     double *memory;                              /* [memory_count]; NULL: of an FMU */
     int64_t memory_count;
@@ -72,6 +86,17 @@ int fmu_get_slopes(struct fmu *fmu, int64_t count, const uint32_t references[],
 /* Gets the change of `count` unknowns for a change of as many knowns. */
 int fmu_get_derivative(struct fmu *fmu, int64_t count, const uint32_t unknowns[],
                        const uint32_t knowns[], const double direction[], double result[]);
+
+#ifdef _WIN32
+#define LOOP_API __declspec(dllexport)
+#else
+#define LOOP_API __attribute__((visibility("default")))
+#endif
+
+/* The intermediate update of FMI 3.0 (section 2.3.1), for an environment struct fmu_polynomials. */
+LOOP_API void loop_update_inputs(void *environment, double time, bool sets, bool gets,
+                                 bool finished, bool may_return, bool *returns,
+                                 double *return_time);
 
 /* Steps from `time` over `length` (s); is_final: no step is ever undone. */
 int fmu_do_step(struct fmu *fmu, double time, double length, bool is_final);

@@ -12,7 +12,7 @@ static bool passes(struct loop *loop, int status, enum loop_phase phase,
         return true;
     }
     const int64_t component = c == NULL ? -1 : c->number;
-    loop->failure = (struct loop_failure){status, phase, component, item, time};
+    loop->failure = (struct loop_failure){status, (int32_t)phase, component, item, time};
     return false;
 }
 
@@ -393,10 +393,11 @@ int loop_missing(void) {
 }
 
 int64_t loop_size(int number) {
-    const size_t sizes[] = {sizeof(struct fmu),         sizeof(struct fmu_variable),
-                            sizeof(struct tangent),     sizeof(struct loop_component),
-                            sizeof(struct loop_switch), sizeof(struct loop_failure),
-                            sizeof(struct loop),        sizeof(struct loop_run)};
+    const size_t sizes[] = {sizeof(struct fmu_polynomials), sizeof(struct fmu),
+                            sizeof(struct fmu_variable),    sizeof(struct tangent),
+                            sizeof(struct loop_component),  sizeof(struct loop_switch),
+                            sizeof(struct loop_failure),    sizeof(struct loop),
+                            sizeof(struct loop_run)};
     const int count = sizeof sizes / sizeof sizes[0];
     return number < count ? (int64_t)sizes[number] : 0;
 }

@@ -1,6 +1,6 @@
 /* The loop of a co-simulation: steps connected FMUs, in Jacobi or Gauss-Seidel order.
  *
- * The host, rparm/loop/loop.py, fills these structures and owns all memory in them; nothing is
+ * The host, rparm/fmi/loop.py, fills these structures and owns all memory in them; nothing is
  * allocated here. It is called for what needs more than a few lines: algebraic loops, and what
  * follows when a Boolean or Integer has changed.
  *
@@ -141,12 +141,6 @@ struct loop_run {
     double *rows;             /* [rows][row_width]; NULL: none. The row before is there, too */
     double *growth;           /* [count] of the tangent */
 };
-
-#ifdef _WIN32
-#define LOOP_API __declspec(dllexport)
-#else
-#define LOOP_API __attribute__((visibility("default")))
-#endif
 
 /* Makes steps; returns how many were made before one failed, which `failure` explains. */
 LOOP_API int64_t loop_advance(struct loop *loop, const struct loop_run *run);

@@ -7,7 +7,6 @@ import functools
 from ctypes import (
     CDLL,
     CFUNCTYPE,
-    POINTER,
     Structure,
     addressof,
     c_double,
@@ -42,7 +41,7 @@ FUNCTIONS = {
 TYPES = ("Boolean", "Integer", "Enumeration")  # enum fmu_type
 ENDED, RAISED = 100, 101
 STEP, READ, ROW, SLOPES, GET_DISCRETE, SET_DISCRETE, NOT_FINITE, HOST = range(8)  # loop_phase
-Solve, Follow = CFUNCTYPE(c_int, c_int64), CFUNCTYPE(c_int)
+Solve, Follow, Host = CFUNCTYPE(c_int, c_int64), CFUNCTYPE(c_int), CFUNCTYPE(c_int, c_double)
 
 
 class _Pointing(Structure):
@@ -57,12 +56,26 @@ class _Pointing(Structure):
             setattr(self, name, array.ctypes.data if is_numpy else addressof(array))
 
 
+class Polynomials(_Pointing):
+    _fields_ = [
+        ("instance", c_void_p),
+        ("set", c_void_p),
+        ("count", c_int64),
+        ("references", c_void_p),
+        ("order", c_int64),
+        ("coefficients", c_void_p),
+        ("values", c_void_p),
+        ("host", Host),
+        ("start", c_double),
+        ("status", c_int32),
+    ]
+
+
 class FmuCalls(_Pointing):
     _fields_ = [
         ("instance", c_void_p),
         ("functions", c_void_p * len(FUNCTIONS["2.0"])),
-        ("step_start", POINTER(c_double)),
-        ("raised", POINTER(c_int32)),
+        ("polynomials", c_void_p),
         ("reached", c_double),
         ("memory", c_void_p),
         ("memory_count", c_int64),
@@ -190,7 +203,8 @@ class Run(_Pointing):
 
 
 STRUCTURES = (
-    FmuCalls, FmuVariable, TangentState, ComponentState, Switch, Failure, LoopState, Run,
+    Polynomials, FmuCalls, FmuVariable, TangentState, ComponentState, Switch, Failure, LoopState,
+    Run,
 )  # fmt: skip
 
 

@@ -13,8 +13,8 @@ from rparm.errors import StoppedError, UserError, WrongValueError, placed
 from rparm.files import difference
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.loop import one_component
 from rparm.fmi.model import ARE_EXACT, INITIAL, INPUTS, PARAMETERS, Experiment, Model, Value
-from rparm.loop.loop import one_component
 from rparm.runs.scenario import USUAL_STEPS, Scenario, count_steps
 
 Input = float | bool | np.ndarray | Sequence[float] | tuple[Any, Any] | Callable[[float], float]

@@ -6,8 +6,8 @@ import numpy as np
 
 from rparm.errors import UserError, placed
 from rparm.fmi.fmi_instance import Instance, UnpackedFmu
+from rparm.fmi.loop import Component
 from rparm.fmi.model import INPUTS, Value
-from rparm.loop.loop import Component
 from rparm.systems.python_component import is_python
 
 

@@ -32,8 +32,8 @@ import numpy as np
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.loop import Loop, check_finite
 from rparm.fmi.model import Model, Value
-from rparm.loop.loop import Loop, check_finite
 from rparm.runs.inputs import Signal
 from rparm.systems.algebraic_loop import AlgebraicLoop
 from rparm.systems.connected_instance import ConnectedInstance

@@ -14,7 +14,7 @@ from by_heyoka import START, STATES, Work
 from solvers import Solvers
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.loop.loop import Loop, one_component
+from rparm.fmi.loop import Loop, one_component
 from rparm.runs import simulation
 from rparm.systems.connected_instance import begin_instance
 from rparm.systems.master import Master, master_of

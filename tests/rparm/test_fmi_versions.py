@@ -216,7 +216,7 @@ def test_what_is_raised_within_a_step_is_not_lost(opened3: Fmu, error: BaseExcep
         instance.input_functions(["tau1"], fail)
         with pytest.raises(type(error)):
             instance.do_step(loaded.start, 0.3)
-        assert times == pytest.approx([0.0, 0.1, 0.2, 0.3])
+        assert times == [0.0]  # the host is not asked again
         instance.input_functions(["tau1"], lambda _: [1.0])
         instance.do_step(loaded.start + 0.3, 0.3)  # nothing is left of it
 

@@ -13,8 +13,8 @@ from fmpy import fmi2
 from rparm import files
 from rparm.console import Progress
 from rparm.errors import StoppedError, UserError
+from rparm.fmi import loop
 from rparm.fmi.fmu_file import Fmu
-from rparm.loop import loop
 from rparm.runs import simulation
 from rparm.runs.scenario import Scenario
 from tests.support.rparm_project import (

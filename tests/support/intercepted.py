@@ -14,7 +14,7 @@ from ctypes import (
 )  # fmt: skip
 from typing import Any
 
-from rparm.loop.loop import Component, function_names
+from rparm.fmi.loop import Component, function_names
 
 PROTOTYPES = {
     "fmi2GetReal": (c_void_p, POINTER(c_uint), c_size_t, POINTER(c_double)),

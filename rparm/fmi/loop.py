@@ -12,7 +12,6 @@ from ctypes import (
     c_double,
     c_void_p,
     cast,
-    pointer,
     sizeof,
 )  # fmt: skip
 from typing import Any
@@ -126,9 +125,8 @@ class Component:
             calls.functions[i] = cast(function, c_void_p).value
         if instance.memory is not None:
             calls.memory, calls.memory_count = instance.memory.ctypes.data, len(instance.memory)
-        if instance.step_start is not None:
-            calls.step_start = pointer(instance.step_start)
-            calls.raised = pointer(instance.has_raised)
+        if instance.polynomials is not None:
+            calls.polynomials = addressof(instance.polynomials)
 
 
 def function_names(instance: Instance) -> Sequence[str]:
