@@ -188,24 +188,36 @@ static int events_of(fmi2Component c) {
     return events;
 }
 
-static void count_steps(fmi2Integer method, long steps, const char *worst_path,
-                        const char *median_path) {
+/* The steps to be written: saving each one would take ten times as long as making it. */
+enum { WORST, MEDIAN, CHOSEN };
+
+/* Makes random steps. Counts them and writes the indices of the chosen ones or, if there are paths,
+ * writes these steps to files. */
+static void make_steps(fmi2Integer method, long steps, long chosen[CHOSEN],
+                       char *const paths[CHOSEN]) {
     static struct work work;
-    static struct work worst;
-    static struct work median;
     const fmi2Component c = initialized(method);
     fmi2FMUstate state = NULL;
     uint64_t most = 0;
     uint64_t middle = 0;
+    int before = 0;
     for (long i = 0; i < steps; i++) {
         work.time = (double)i * step_size;
         draw_efforts(i, work.efforts);
-        save(c, &state, &work);
-        const int before = events_of(c);
+        for (int k = 0; paths != NULL && k < CHOSEN; k++) {
+            if (i == chosen[k]) {
+                save(c, &state, &work);
+                write_work(paths[k], &work);
+            }
+        }
         blocks = 0;
         set_and_step(c, &work);
+        if (paths != NULL) {
+            continue;
+        }
         const uint64_t count = blocks;
         const int events = events_of(c) - before;
+        before += events;
         require(events < MOST_EVENTS && count < (uint64_t)MOST_BLOCKS * 8,
                 "a step of too much work");
         const uint64_t bin = count / SHARE;
@@ -213,15 +225,25 @@ static void count_steps(fmi2Integer method, long steps, const char *worst_path,
         largest[events] = count > largest[events] ? count : largest[events];
         if (count > most) {
             most = count;
-            worst = work;
+            chosen[WORST] = i;
         }
-        if (i % 1000 == 999) {
+        if (i < 1000000 && i % 1000 == 999) {
             middle = median_of(histogram[0], steps_with(0));
         }
         if (events == 0 && bin == middle / SHARE) {
-            median = work;
+            chosen[MEDIAN] = i;
         }
     }
+    fmu.FreeInstance(c);
+}
+
+static void count_steps(fmi2Integer method, long steps, char *const paths[CHOSEN]) {
+    long chosen[CHOSEN] = {0};
+    const uint64_t first_seed = seed;
+    make_steps(method, steps, chosen, NULL);
+    seed = first_seed;
+    make_steps(method, 1 + (chosen[WORST] > chosen[MEDIAN] ? chosen[WORST] : chosen[MEDIAN]),
+               chosen, paths);
     for (int events = 0; events < MOST_EVENTS; events++) {
         const uint64_t found = steps_with(events);
         if (found > 0) {
@@ -230,9 +252,6 @@ static void count_steps(fmi2Integer method, long steps, const char *worst_path,
                    (unsigned long long)largest[events]);
         }
     }
-    write_work(worst_path, &worst);
-    write_work(median_path, &median);
-    fmu.FreeInstance(c);
 }
 
 static void replay(fmi2Integer method, const char *path) {
@@ -282,7 +301,7 @@ int main(int count, char **arguments) {
     seed = strtoull(arguments[count == 9 ? 6 : 5], NULL, 10);
     if (what[0] == 'c' && what[2] == 'u') {
         restitution = strtod(arguments[4], NULL);
-        count_steps(method, strtol(arguments[5], NULL, 10), arguments[7], arguments[8]);
+        count_steps(method, strtol(arguments[5], NULL, 10), arguments + 7);
     } else {
         step_confined(method, strtol(arguments[4], NULL, 10));
     }
