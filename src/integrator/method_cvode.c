@@ -212,10 +212,10 @@ static enum status configure(void *memory) {
  * internal steps. */
 static const double first_step_fraction = 0.1;
 
-/* Fraction after an event. There errors add up in another way: each bounce adds to the error of the
- * height, and the last bounces are as low as the tolerance. So the first steps are short, and do
- * not grow to the tolerance before the order does: bouncing then rests 1.7e-7 s early, as its
- * cut-off says, and not 2.8e-7 s, for 5 % more time. */
+/* Fraction after an event, where no series starts the method. There errors add up in another way:
+ * each bounce adds to the error of the height, and the last bounces are as low as the tolerance. So
+ * the first steps are short, and do not grow to the tolerance before the order does: bouncing then
+ * rests 1.7e-7 s early, as its cut-off says, and not 2.8e-7 s, for 5 % more time. */
 static const double first_step_fraction_after_event = 0.003;
 
 /* Returns the fraction of the length at which the error of a step of order 1, about h^2 x'' / 2, is
