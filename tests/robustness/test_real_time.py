@@ -23,17 +23,17 @@ OF_VARIABLE = re.compile(r'<ScalarVariable name="(\w+)" valueReference="(\d+)"')
 # Largest work of a step over the median of those without events: of a step without events, and
 # the first part of one with events. What ten million steps add to both.
 BOUNDS = {
-    ("RPPlant", "cvode_adams"): (11, 13),
+    ("RPPlant", "cvode_adams"): (11, 12),
     ("RPPlant", "taylor"): (8, 13),
     ("Six", "cvode_adams"): (3, 3),
-    ("Six", "taylor"): (4, 8),
+    ("Six", "taylor"): (4, 9),
 }
-RARE = {"RPPlant": 5, "Six": 1}
+RARE = 4
 
 
 def each(method: str, median: int, indicators: int) -> float:
     """What each event adds, in medians. median: of instructions."""
-    return 0.5 if method == "cvode_adams" else 1 + (7000 + 500 * indicators) / median
+    return 0.5 if method == "cvode_adams" else 1 + (5000 + 500 * indicators) / median
 
 
 @dataclass
@@ -129,9 +129,7 @@ def check_steps(measured: Measured, method: str, restitution: float, folder: Pat
     figures = [instructions(measured, METHODS[method], work) for work in (median, worst)]
     print(measured.name, method, restitution, *steps, figures, sep="\n")
     assert steps[0].events == 0 and steps[1].events == 1 and steps[1].count > 300
-    bounds = [
-        x + RARE[measured.name] * (int(STEPS) > 1_000_000) for x in BOUNDS[measured.name, method]
-    ]
+    bounds = [x + RARE * (int(STEPS) > 1_000_000) for x in BOUNDS[measured.name, method]]
     more = each(method, figures[0], measured.indicators)
     for found in steps:
         bound = bounds[0] if found.events == 0 else bounds[1] + more * found.events
