@@ -33,7 +33,7 @@ RARE = 4
 
 def each(method: str, median: int, indicators: int) -> float:
     """What each event adds, in medians. median: of instructions."""
-    return 0.5 if method == "cvode_adams" else 1 + (5000 + 500 * indicators) / median
+    return 1 / 3 if method == "cvode_adams" else 1 + (5000 + 500 * indicators) / median
 
 
 @dataclass
