@@ -308,7 +308,10 @@ static enum status sample(struct location *location, double s, int k) {
 struct piece {
     double begin; /* s */
     double length;
-    int count; /* number of points sampled */
+    int count;        /* number of points sampled */
+    size_t indicator; /* the last one searched */
+    double error;     /* of its polynomial, in its unit */
+    int vain_halves;  /* searched halves in which no part has a smaller error */
 };
 
 /* Samples between the points of the piece, which then has 2 count - 1 points. */
@@ -332,7 +335,7 @@ enum { FEWEST_POINTS = 5 };
 
 static enum status begin_piece(struct location *location, double begin, double length,
                                struct piece *piece) {
-    *piece = (struct piece){begin, length, FEWEST_POINTS};
+    *piece = (struct piece){begin, length, FEWEST_POINTS, 0, 0.0, 0};
     enum status status = STATUS_OK;
     const bool is_at_restart = begin == 0.0 && location->calm_end == 0.0 &&
                                location->step.begin == 0.0 && !location->step.is_from_end;
@@ -341,14 +344,6 @@ static enum status begin_piece(struct location *location, double begin, double l
         status = sample(location, begin + length * chebyshev_point(FEWEST_POINTS, k), k);
     }
     return status;
-}
-
-static double largest(const double samples[], int count) {
-    double scale = 0.0;
-    for (int k = 0; k < count; k++) {
-        scale = larger(fabs(samples[k]), scale);
-    }
-    return scale;
 }
 
 static const double far_above = 16.0; // errors of a polynomial by which it is surely above 0
@@ -401,11 +396,16 @@ static bool stay_calm(struct location *location) {
 }
 
 /* Searches one indicator in a piece. Returns false if the piece needs more points. */
-static bool search_piece(struct location *location, const struct piece *piece, size_t i,
+static bool search_piece(struct location *location, struct piece *piece, size_t i,
                          bool is_last_try) {
     double c[ROOTS_LENGTH] = {0};
     const double error = chebyshev_interpolate(piece->count, location->samples[i], c);
-    const double size = largest(location->samples[i], piece->count);
+    piece->indicator = i;
+    piece->error = error;
+    double size = 0.0;
+    for (int k = 0; k < piece->count; k++) {
+        size = larger(fabs(location->samples[i][k]), size);
+    }
     const double noise = larger(representation * size, location->rounding[i]);
     const bool is_exact = error <= noise;
     const int degree = piece->count - 1;
@@ -425,9 +425,12 @@ static bool search_piece(struct location *location, const struct piece *piece, s
 /* Shortest piece of a step: a step is divided in two until polynomials represent all indicators. */
 static const double shortest_piece = 0x1p-10;
 
-/* Searches the indicators from number `from` on. */
+/* Part of a piece's error that its halves have where an indicator is but rounding. */
+static const double no_gain = 0x1p-6;
+
+/* Searches the indicators from number `from` on in a half of a piece, or in a step. */
 static enum status search_model_in(struct location *location, double begin, double length,
-                                   size_t from) {
+                                   size_t from, struct piece *whole) {
     struct piece piece;
     enum status status = begin_piece(location, begin, length, &piece);
     if (status != STATUS_OK || are_calm(location, piece.count)) {
@@ -436,19 +439,25 @@ static enum status search_model_in(struct location *location, double begin, doub
     }
     size_t i = from;
     while (status == STATUS_OK && i < location->ode->indicator_count) {
-        const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece;
         const bool is_wanted = location->indicators[i].kind == INDICATOR_OF_MODEL &&
                                !location->has_row[i] && location->first[i] > begin;
-        if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
+        if (!is_wanted || search_piece(location, &piece, i, false)) {
             i++;
         } else if (piece.count < CHEBYSHEV_LENGTH) {
             status = sample_between(location, &piece);
         } else {
-            status = search_model_in(location, begin, 0.5 * length, i);
-            if (status == STATUS_OK) {
-                status = search_model_in(location, begin + 0.5 * length, 0.5 * length, i);
+            const bool gains = i != whole->indicator || piece.error < no_gain * whole->error;
+            if (length > shortest_piece && (gains || whole->vain_halves == 0)) {
+                const double half = 0.5 * length;
+                for (int k = 0; k < 2 && status == STATUS_OK; k++) {
+                    status = search_model_in(location, begin + k * half, half, i, &piece);
+                }
+                whole->vain_halves += !gains && piece.vain_halves == 2;
+                break;
             }
-            break;
+            whole->vain_halves += !gains;
+            (void)search_piece(location, &piece, i, true);
+            i++;
         }
     }
     return status;
@@ -503,17 +512,10 @@ static const double same_time = 4.0 * 0x1p-52;
 static double guessed_fall(const struct location *location, size_t i) {
     const struct step_polynomial *step = &location->step;
     const struct indicator *indicator = &location->indicators[i];
-    const bool is_of_state = indicator->kind == INDICATOR_OF_STATE;
-    const double *row = is_of_state ? step->row[indicator->state] : step->indicator_row[i];
-    const double factor = is_of_state ? indicator->factor : 1.0;
-    const double c0 = factor * row[0] + (is_of_state ? indicator->offset : 0.0);
-    const double c1 = factor * row[1];
-    const double c2 = factor * row[2];
-    const double square = c1 * c1 - 4.0 * c0 * c2;
-    if (!(square >= 0.0) || (c1 > 0.0 && c2 >= 0.0)) {
-        return INFINITY;
+    if (indicator->kind != INDICATOR_OF_STATE) {
+        return roots_guess(0.0, 1.0, step->indicator_row[i]);
     }
-    return c1 > 0.0 ? (c1 + sqrt(square)) / (-2.0 * c2) : 2.0 * c0 / (sqrt(square) - c1);
+    return roots_guess(indicator->offset, indicator->factor, step->row[indicator->state]);
 }
 
 /* Returns the place in `used` of the indicator that is likely to fall first, of those whose first[]
@@ -567,7 +569,9 @@ static enum status search_step(struct location *location) {
     }
     double s = needs_search ? search_polynomials(location) : INFINITY;
     if (needs_model && !stay_calm(location)) {
-        const enum status status = search_model_in(location, 0.0, fmin(s + same_time, 1.0), 0);
+        struct piece none = {.error = INFINITY};
+        const double length = fmin(s + same_time, 1.0);
+        const enum status status = search_model_in(location, 0.0, length, 0, &none);
         if (status != STATUS_OK) {
             return status;
         }

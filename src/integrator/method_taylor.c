@@ -7,7 +7,8 @@
  *
  * If a restart continues the same solution, its first step has the largest order and is as long as
  * this allows. The requested times in it are values of one polynomial. After an event another one
- * may be near: then the first step has about half the order at most. */
+ * may be near: then the first step leads past a guess of it, or has about half the order at most.
+ */
 #include "method.h"
 #include "taylor_series.h"
 #include "workspace.h"
@@ -86,6 +87,7 @@ static enum status restart(void *memory, const double x[]) {
     taylor->is_searched = location_is_active(&taylor->series.problem->location);
     taylor->last_length = taylor->series.problem->first_step;
     taylor->series.is_event_near = taylor->is_searched && taylor->series.problem->is_after_event;
+    taylor->series.may_guess = taylor->series.is_event_near;
     return STATUS_OK;
 }
 
@@ -267,7 +269,8 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
         return status;
     }
     series->expected_order = is_long ? series->expected_order : series->order;
-    series->is_event_near = false;
+    series->is_event_near = series->is_guessed;
+    series->may_guess = false;
     const bool lands = step == 1.0 && series->time_scale == t - now;
     *end = lands ? t : now + step * series->time_scale;
     if (!(*end > now)) {
@@ -282,7 +285,8 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     } else {
         memcpy(x, taylor->end_x, n * sizeof(double));
     }
-    taylor->last_length = *end - now;
+    // after a wrong guess the next step is as if there had been none
+    taylor->last_length = series->is_guessed ? taylor->last_length : *end - now;
     work->steps++;
     work->last_order = series->order;
     work->last_step = *end - now;

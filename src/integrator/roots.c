@@ -454,6 +454,17 @@ double roots_search_first(const struct roots_polynomial *p) {
     return sign > 0 && find(&rising, 1, 1, roots) > 0 ? roots[0].s : INFINITY;
 }
 
+double roots_guess(double offset, double factor, const double c[]) {
+    const double c0 = offset + factor * c[0];
+    const double c1 = factor * c[1];
+    const double c2 = factor * c[2];
+    const double square = c1 * c1 - 4.0 * c0 * c2;
+    if (!(square >= 0.0) || (c1 > 0.0 && c2 >= 0.0)) {
+        return INFINITY;
+    }
+    return c1 > 0.0 ? (c1 + sqrt(square)) / (-2.0 * c2) : 2.0 * c0 / (sqrt(square) - c1);
+}
+
 /* ---- Falls ----------------------------------------------------------------------------------- */
 
 /* Returns the fall to 0 beside s: the first one after it, or the last one up to it. INFINITY if

@@ -145,6 +145,10 @@ MUST_CHECK NONNULL static inline double roots_first(const struct roots_polynomia
     return roots_is_above(p) ? INFINITY : roots_search_first(p);
 }
 
+/* Returns about where offset + factor p falls to 0, by the parabola with the first three
+ * coefficients of p; INFINITY if it does not. */
+NONNULL double roots_guess(double offset, double factor, const double c[]);
+
 /* ---- Falls ----------------------------------------------------------------------------------
  * Falls of an indicator to 0, given by its polynomial. A touch of 0 is no fall; near a restart,
  * rounding may leave an indicator on either side of 0. */

@@ -1,5 +1,6 @@
 #include "taylor_series.h"
 
+#include "guess.h"
 #include "workspace.h"
 
 #include <float.h>
@@ -52,6 +53,7 @@ void taylor_series_configure(struct taylor_series *series) {
     }
     series->largest_order = order + 1 - order % 2;
     series->expected_order = LEAST_ORDER;
+    series->guessed_order = LEAST_ORDER;
 }
 
 /* ---- Orders --------------------------------------------------------------------------------- */
@@ -152,26 +154,79 @@ static enum status find_order(struct taylor_series *series) {
     }
 }
 
+/* ---- Next event ----------------------------------------------------------------------------- */
+
+/* Nearest and farthest guess, in time scales: what is nearer may be rounding. */
+static const double nearest_guess = 0x1p-10;
+static const double farthest_guess = 32.0;
+
+/* Smallest order of such a step: that of the guess, and one to judge it. */
+enum { LEAST_GUESSED_ORDER = 3 };
+
+/* Makes the step end soon after the next event, if there is a guess of it, with the fewest orders
+ * that suffice there. */
+static enum status lead_past_guess(struct taylor_series *series, double longest) {
+    const double guess = guess_next_event(series->problem, series->row, nearest_guess);
+    if (!(guess < farthest_guess)) {
+        return STATUS_OK;
+    }
+    const double step = fmin(guess_passed * guess, longest);
+    double power = step * step;
+    double before = power * size_of(series, 2, INFINITY);
+    for (int order = LEAST_GUESSED_ORDER; order <= series->largest_order / 2; order++) {
+        if (order > series->order) {
+            const enum status status = taylor_series_add_orders(series, order);
+            if (status != STATUS_OK) {
+                return status;
+            }
+        }
+        power *= step;
+        const double size = power * size_of(series, order, INFINITY);
+        if (before + size <= 1.0) {
+            series->order = order;
+            series->guessed_order = order;
+            series->is_guessed = true;
+            series->step = step;
+            return STATUS_OK;
+        }
+        before = size;
+    }
+    return STATUS_OK;
+}
+
 enum status taylor_series_expand(struct taylor_series *series, double t, double time_scale,
                                  const double x[], double longest) {
     const bool is_long = longest > 0.0;
+    const bool may_guess = is_long && series->may_guess;
     const int least = series->is_event_near ? LEAST_ORDER + 2 : series->largest_order;
-    int last = is_long ? least : series->expected_order;
-    enum status status = begin(series, t, time_scale, x, last);
-    if (status != STATUS_OK || !is_long) {
-        return status != STATUS_OK ? status : find_order(series);
+    const int of_long = may_guess ? series->guessed_order : least;
+    series->is_guessed = false;
+    enum status status =
+        begin(series, t, time_scale, x, is_long ? of_long : series->expected_order);
+    if (status == STATUS_OK && may_guess) {
+        status = lead_past_guess(series, longest);
+    }
+    if (status != STATUS_OK || series->is_guessed) {
+        return status;
+    }
+    if (!is_long) {
+        return find_order(series);
     }
     // the next event may be as near as the last one: most of a longer step would be lost to it
-    while (last < series->largest_order / 2 &&
-           size_of(series, last - 1, 1.0) + size_of(series, last, 1.0) > 1.0) {
-        last += 2;
-        status = taylor_series_add_orders(series, last);
-        if (status != STATUS_OK) {
-            return status;
+    for (int last = least;; last += 2) {
+        if (last > series->order) {
+            status = taylor_series_add_orders(series, last);
+            if (status != STATUS_OK) {
+                return status;
+            }
+        }
+        if (last >= series->largest_order / 2 ||
+            size_of(series, last - 1, 1.0) + size_of(series, last, 1.0) <= 1.0) {
+            series->order = last;
+            series->step = step_of_last_terms(series, last, longest);
+            return STATUS_OK;
         }
     }
-    series->step = step_of_last_terms(series, last, longest);
-    return STATUS_OK;
 }
 
 /* ---- Check ---------------------------------------------------------------------------------- */

@@ -19,10 +19,13 @@ struct taylor_series {
     struct problem *problem;
     int largest_order;
     bool may_hide;      /* true if there are inner quantities, or a state may vanish */
-    bool is_event_near; /* true if the next long step begins at an event */
+    bool is_event_near; /* true if the next long step begins at an event, or after a wrong guess */
+    bool may_guess;     /* true if it may end soon after a guess of the next event */
+    bool is_guessed;    /* true if the step does */
     int order;
     int expected_order; /* order to which a step that lands is expanded at first; the result does
                            not depend on it */
+    int guessed_order;  /* the same of a step that ends soon after a guess */
     double begin;       /* s since the restart */
     double time_scale;  /* s */
     double step;        /* step for which the series is good; NaN if a term is not finite */
@@ -44,7 +47,8 @@ NONNULL void taylor_series_configure(struct taylor_series *series);
 
 /* Expands the solution about the state x at the time t, and writes `step`. If longest > 0, the step
  * is as long as the largest order allows, and at most this long; if an event is near, only
- * as many orders as suffice one time scale ahead, and about half the largest at most. If longest is
+ * as many orders as suffice one time scale ahead, and about half the largest at most. If the next
+ * event is guessed within, the step ends soon after it and has the fewest orders. If longest is
  * 0, orders are added until the terms one time scale ahead are within the tolerance; the step is 1,
  * or less if the largest order is not enough. */
 MUST_CHECK NONNULL enum status taylor_series_expand(struct taylor_series *series, double t,

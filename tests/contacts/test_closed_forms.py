@@ -138,7 +138,9 @@ def test_a_clutch_locks_and_slips_under_load(run_of: Run, tolerance: float) -> N
     agree(run, tolerance, w1=pieces(run["time"], *w1), w2=pieces(run["time"], *w2))
     has_events_at(run, tolerance, locks, 3, slips)
     locked = run["friction.plates.mode"] == STUCK
-    assert locked.tolist() == ((run["time"] > locks) & (run["time"] < slips)).tolist()
+    is_clear = np.abs(run["time"] - slips) > 1e-9  # rounding decides where a point is at an event
+    expected = (run["time"] > locks) & (run["time"] < slips)
+    assert locked[is_clear].tolist() == expected[is_clear].tolist()
     load = 2 * np.maximum(0, run["time"] - 3)
     torque = 3 + load[locked] / 4
     assert run["friction.plates.force"][locked] == pytest.approx(torque, abs=1e3 * tolerance)

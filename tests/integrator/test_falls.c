@@ -102,7 +102,7 @@ static const double below = -1e-6;
 static const size_t row_of_indicator[1] = {0};
 static const struct series rows = {.row_count = 1, .row_of_indicator = row_of_indicator};
 static double rate;
-static enum { LINE, SINE, SWING, JUMP } shape;
+static enum { LINE, SINE, SWING, JUMP, NOISE } shape;
 static int calls; /* of the indicator */
 static const double pi = 3.141592653589793;
 static struct integrator *integrator;
@@ -144,11 +144,12 @@ static double swing(double t) {
 
 static enum status indicators(double t, const double x[], double z[], void *context) {
     calls++;
-    z[0] = shape == LINE   ? x[0]
-           : shape == SINE ? sin(x[0]) - 0.01
-           : shape == JUMP ? (t < 0.3 ? 1.0 : -1.0)
-           : t < 0.5       ? 1.1
-                           : swing(t);
+    z[0] = shape == LINE    ? x[0]
+           : shape == SINE  ? sin(x[0]) - 0.01
+           : shape == JUMP  ? (t < 0.3 ? 1.0 : -1.0)
+           : shape == NOISE ? 1.0 + 0.5 * chance()
+           : t < 0.5        ? 1.1
+                            : swing(t);
     return STATUS_OK;
 }
 
@@ -160,7 +161,7 @@ static double run(int method, enum indicator_kind kind) {
         .jacobian = jacobian,
         .series = series,
         .series_row_count = 1,
-        .rows = shape == SWING || shape == JUMP ? NULL : &rows,
+        .rows = shape == LINE || shape == SINE ? &rows : NULL,
         .indicator_count = 1,
         .indicators = indicators,
     };
@@ -226,5 +227,16 @@ static void test_a_jump_is_located_in_the_shortest_piece(void) {
         calls = 0;
         TEST_ASSERT_DOUBLE_WITHIN(0x1p-10, 0.3, run(method, INDICATOR_OF_MODEL));
         TEST_ASSERT_LESS_THAN_INT(260, calls); // each division samples 22 points or so
+    }
+}
+
+/* A step is not divided further where its halves have the same error: the indicator is rounding. */
+static void test_noise_is_not_divided_to_the_shortest_pieces(void) {
+    shape = NOISE;
+    rate = 0.0;
+    for (int method = 1; method < INTEGRATOR_METHODS; method++) {
+        calls = 0;
+        TEST_ASSERT_TRUE(run(method, INDICATOR_OF_MODEL) == 1.0);
+        TEST_ASSERT_LESS_THAN_INT(5000, calls); // up to 150 000 with all pieces
     }
 }

@@ -300,7 +300,8 @@ static void test_the_workspace_of_gradients_is_enough(void) {
     for (size_t n = 1; n <= 20; n++) {
         for (gradients = 1; gradients <= 20; gradients++) {
             size_t count = n * (1 + gradients);
-            const struct ode ode = decay_of(&count);
+            struct ode ode = decay_of(&count);
+            ode.indicator_count = gradients % 2; // CVODE takes a series where there are events
             size_t size = 0;
             TEST_ASSERT_TRUE(most_bytes_taken(&ode, &size) <= size);
         }

@@ -1,5 +1,6 @@
-/* How much work a step of the plant is: random steps of 1 ms with friction that holds and stops,
- * counted in blocks of code by a library compiled with -fsanitize-coverage=trace-pc.
+/* How much work a step of the plant is, or of six.toml: random steps of 1 ms with friction that
+ * holds and stops, counted in blocks of code by a library compiled with
+ * -fsanitize-coverage=trace-pc. value_references.h decides which model it is.
  *
  *     real_time count LIBRARY METHOD RESTITUTION STEPS SEED WORST MEDIAN
  *         prints a line for each number of events in a step: that number, how many such steps, the
@@ -14,6 +15,7 @@
 #include "fmu_library.h"
 #include "value_references.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -56,35 +58,55 @@ struct work {
     fmi2Byte state[8192];
 };
 
-/* ---- Plant ---------------------------------------------------------------------------------- */
+/* ---- Models --------------------------------------------------------------------------------- */
 
-static const fmi2ValueReference references[] = {RP_PLANT_coulomb_friction1,
-                                                RP_PLANT_coulomb_friction2,
-                                                RP_PLANT_breakaway_friction1,
-                                                RP_PLANT_breakaway_friction2,
-                                                RP_PLANT_stribeck_velocity1,
-                                                RP_PLANT_stribeck_velocity2,
-                                                RP_PLANT_damping1,
-                                                RP_PLANT_damping2,
-                                                RP_PLANT_lower1,
-                                                RP_PLANT_upper1,
-                                                RP_PLANT_lower2,
-                                                RP_PLANT_upper2,
-                                                RP_PLANT_restitution1,
-                                                RP_PLANT_restitution2};
-static double values[] = {4.0, 3.0, 6.0, 5.0, 0.05, 0.05, 0.5, 2.0, -1.0, 1.0, -0.1, 0.2, 0.5, 0.5};
+#ifdef SIX_GUID
+#define MODEL(name) SIX_##name
+static const double mean_effort = 0.0; /* N */
+static const fmi2ValueReference efforts[] = {SIX_u1, SIX_u2};
+static const fmi2ValueReference restitutions[] = {SIX_e};
+
+static bool set_parameters(fmi2Component c) {
+    return c != NULL;
+}
+#else
+#define MODEL(name) RP_PLANT_##name
+static const double mean_effort = 12.0; /* N.m, against gravity */
 static const fmi2ValueReference efforts[] = {RP_PLANT_tau1, RP_PLANT_f2};
-static const fmi2ValueReference stops[] = {RP_PLANT_stops1, RP_PLANT_stops2};
+static const fmi2ValueReference restitutions[] = {RP_PLANT_restitution1, RP_PLANT_restitution2};
+
+static bool set_parameters(fmi2Component c) {
+    static const fmi2ValueReference references[] = {RP_PLANT_coulomb_friction1,
+                                                    RP_PLANT_coulomb_friction2,
+                                                    RP_PLANT_breakaway_friction1,
+                                                    RP_PLANT_breakaway_friction2,
+                                                    RP_PLANT_stribeck_velocity1,
+                                                    RP_PLANT_stribeck_velocity2,
+                                                    RP_PLANT_damping1,
+                                                    RP_PLANT_damping2,
+                                                    RP_PLANT_lower1,
+                                                    RP_PLANT_upper1,
+                                                    RP_PLANT_lower2,
+                                                    RP_PLANT_upper2};
+    static const double values[] = {4.0, 3.0, 6.0, 5.0, 0.05, 0.05, 0.5, 2.0, -1.0, 1.0, -0.1, 0.2};
+    static const fmi2ValueReference stops[] = {RP_PLANT_stops1, RP_PLANT_stops2};
+    static const fmi2Integer rigid[] = {2, 2};
+    return fmu.SetReal(c, references, COUNT(references), values) == fmi2OK &&
+           fmu.SetInteger(c, stops, COUNT(stops), rigid) == fmi2OK;
+}
+#endif
+
+static double restitution = 0.5;
 
 static fmi2Component initialized(fmi2Integer method) {
     static const fmi2CallbackFunctions callbacks = {.logger = receive};
-    static const fmi2Integer rigid[] = {2, 2};
-    static const fmi2ValueReference solver_method = RP_PLANT_solver_method;
-    const fmi2Component c = fmu.Instantiate("real_time", fmi2CoSimulation, RP_PLANT_GUID, NULL,
+    static const fmi2ValueReference solver_method = MODEL(solver_method);
+    const double both[] = {restitution, restitution};
+    const fmi2Component c = fmu.Instantiate("real_time", fmi2CoSimulation, MODEL(GUID), NULL,
                                             &callbacks, fmi2False, fmi2False);
     require(c != NULL, "no instance");
-    require(fmu.SetReal(c, references, COUNT(references), values) == fmi2OK &&
-                fmu.SetInteger(c, stops, COUNT(stops), rigid) == fmi2OK &&
+    require(set_parameters(c) &&
+                fmu.SetReal(c, restitutions, COUNT(restitutions), both) == fmi2OK &&
                 fmu.SetInteger(c, &solver_method, 1, &method) == fmi2OK &&
                 fmu.SetupExperiment(c, fmi2True, 1e-8, 0.0, fmi2False, 0.0) == fmi2OK &&
                 fmu.EnterInitializationMode(c) == fmi2OK && fmu.ExitInitializationMode(c) == fmi2OK,
@@ -117,7 +139,7 @@ static void draw_efforts(long i, double drawn[2]) {
             push[k] = chance() > 0.6 ? 0.0 : 25.0 * chance();
         }
     }
-    drawn[0] = 12.0 + push[0] + 0.5 * chance();
+    drawn[0] = mean_effort + push[0] + 0.5 * chance();
     drawn[1] = push[1] + 0.5 * chance();
 }
 
@@ -160,30 +182,42 @@ static void save(fmi2Component c, fmi2FMUstate *state, struct work *work) {
 }
 
 static int events_of(fmi2Component c) {
-    static const fmi2ValueReference event_count = RP_PLANT_event_count;
+    static const fmi2ValueReference event_count = MODEL(event_count);
     fmi2Integer events = 0;
     require(fmu.GetInteger(c, &event_count, 1, &events) == fmi2OK, "no count of events");
     return events;
 }
 
-static void count_steps(fmi2Integer method, long steps, const char *worst_path,
-                        const char *median_path) {
+/* The steps to be written: saving each one would take ten times as long as making it. */
+enum { WORST, MEDIAN, CHOSEN };
+
+/* Makes random steps. Counts them and writes the indices of the chosen ones or, if there are paths,
+ * writes these steps to files. */
+static void make_steps(fmi2Integer method, long steps, long chosen[CHOSEN],
+                       char *const paths[CHOSEN]) {
     static struct work work;
-    static struct work worst;
-    static struct work median;
     const fmi2Component c = initialized(method);
     fmi2FMUstate state = NULL;
     uint64_t most = 0;
     uint64_t middle = 0;
+    int before = 0;
     for (long i = 0; i < steps; i++) {
         work.time = (double)i * step_size;
         draw_efforts(i, work.efforts);
-        save(c, &state, &work);
-        const int before = events_of(c);
+        for (int k = 0; paths != NULL && k < CHOSEN; k++) {
+            if (i == chosen[k]) {
+                save(c, &state, &work);
+                write_work(paths[k], &work);
+            }
+        }
         blocks = 0;
         set_and_step(c, &work);
+        if (paths != NULL) {
+            continue;
+        }
         const uint64_t count = blocks;
         const int events = events_of(c) - before;
+        before += events;
         require(events < MOST_EVENTS && count < (uint64_t)MOST_BLOCKS * 8,
                 "a step of too much work");
         const uint64_t bin = count / SHARE;
@@ -191,15 +225,25 @@ static void count_steps(fmi2Integer method, long steps, const char *worst_path,
         largest[events] = count > largest[events] ? count : largest[events];
         if (count > most) {
             most = count;
-            worst = work;
+            chosen[WORST] = i;
         }
-        if (i % 1000 == 999) {
+        if (i < 1000000 && i % 1000 == 999) {
             middle = median_of(histogram[0], steps_with(0));
         }
         if (events == 0 && bin == middle / SHARE) {
-            median = work;
+            chosen[MEDIAN] = i;
         }
     }
+    fmu.FreeInstance(c);
+}
+
+static void count_steps(fmi2Integer method, long steps, char *const paths[CHOSEN]) {
+    long chosen[CHOSEN] = {0};
+    const uint64_t first_seed = seed;
+    make_steps(method, steps, chosen, NULL);
+    seed = first_seed;
+    make_steps(method, 1 + (chosen[WORST] > chosen[MEDIAN] ? chosen[WORST] : chosen[MEDIAN]),
+               chosen, paths);
     for (int events = 0; events < MOST_EVENTS; events++) {
         const uint64_t found = steps_with(events);
         if (found > 0) {
@@ -208,9 +252,6 @@ static void count_steps(fmi2Integer method, long steps, const char *worst_path,
                    (unsigned long long)largest[events]);
         }
     }
-    write_work(worst_path, &worst);
-    write_work(median_path, &median);
-    fmu.FreeInstance(c);
 }
 
 static void replay(fmi2Integer method, const char *path) {
@@ -259,8 +300,8 @@ int main(int count, char **arguments) {
     }
     seed = strtoull(arguments[count == 9 ? 6 : 5], NULL, 10);
     if (what[0] == 'c' && what[2] == 'u') {
-        values[COUNT(values) - 2] = values[COUNT(values) - 1] = strtod(arguments[4], NULL);
-        count_steps(method, strtol(arguments[5], NULL, 10), arguments[7], arguments[8]);
+        restitution = strtod(arguments[4], NULL);
+        count_steps(method, strtol(arguments[5], NULL, 10), arguments + 7);
     } else {
         step_confined(method, strtol(arguments[4], NULL, 10));
     }
