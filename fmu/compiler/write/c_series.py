@@ -240,7 +240,7 @@ class Series:
     def parts(self) -> dict[str, list[str]]:
         """What equations.c.in has blocks for."""
         if self.is_wide:
-            self.sums.sort(lambda value: (self.forms[value], self.order[value]))
+            self.sums.sort(self.forms, self.order)
             width = len(self.columns)
             own = f"double(*const at)[{width}] = (double(*)[{width}])(void *)row[{len(self.rows)}];"
             self.still.statements.insert(0, Statement((own,)))

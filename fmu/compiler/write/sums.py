@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import NamedTuple
@@ -54,11 +54,12 @@ class Sums:
         self.paths[term] = common(self.paths.get(term, path), path)
         return found
 
-    def sort(self, place: Callable[[Value], tuple[object, ...]]) -> None:
-        """Put sums of one form side by side, by the places of values."""
+    def sort(self, form: Mapping[Value, tuple], order: Mapping[Value, int]) -> None:
+        """Put sums of one form side by side, in the order of their factors."""
 
         def key(term: Term) -> tuple[object, ...]:
-            return term.is_weighted, [place(v) for v in term[:2]]
+            factors = term[:2]
+            return term.is_weighted, [form[v] for v in factors], [order[v] for v in factors]
 
         self.places = {term: self.places[term] for term in sorted(self.places, key=key)}
         for i, to in enumerate(self.places.values()):
