@@ -266,7 +266,7 @@ class Series:
         is_long = not self.opened.conditions and sum(map(len, parts.values())) >= SHORTEST
         if self.is_wide:
             found = self.sums.in_array()
-            found.terms = self.sums.terms(self.sums.places)
+            found.terms = self.sums.terms()
         else:
             newest = None if is_long else Newest(self._row)
             found = self.sums.parts(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import combinations
 from typing import NamedTuple
 
@@ -14,30 +15,33 @@ from .newest import Newest
 from .statements import Block, Item, Operand, Place, Statement, store
 
 FEWEST_IN_PAIRS = 2  # sums that gain by adding up two at once
-EACH = "int i = 1; i < k; i++"
+EACH_FOURTH = "int i = 1; i + 3 < k; i += 4"
+EACH_LEFT = "int i = (k - 1) / 4 * 4 + 1; i < k; i++"
 EACH_SECOND = "int i = {}; i + 1 < k; i += 2"
 Within = Callable[[Path, list[Item]], list[Item]]  # statements in the blocks of a path
 
 
-# terms of a sum of which loops are made, and what they read: the coefficient before, the other
-# factor's, and where that stands behind coefficient k
+# terms of a sum of which loops are made
 WHERE = ("1", "2", "i", "i + 1", "k - 1")
-WEIGHTS = {"i + 1": ("+", "i", "1"), "k - 1": ("-", "k", "1")}
+FOUR = ("i", "i + 1", "i + 2", "i + 3")
+BEFORE = {"1": "0", "2": "1", "i": "i - 1", "i + 1": "i", "i + 2": "i + 1", "i + 3": "i + 2"}
+BEFORE |= {"k - 1": "k - 2"}
 
 
-def before(i: str) -> str:
-    """Return i - 1."""
-    return {"1": "0", "2": "1", "i + 1": "i", "k - 1": "k - 2"}.get(i, f"{i} - 1")
+def plus(a: Operand, b: Operand) -> Operand:
+    """Return the sum."""
+    return "+", a, b
 
 
 def rest(i: str) -> str:
     """Return k - i."""
-    return {"i + 1": "k - i - 1", "k - 1": "1"}.get(i, f"k - {i}")
+    return "1" if i == "k - 1" else "k - " + i.replace("+", "-")
 
 
-def behind(i: str) -> str:
-    """Return -i."""
-    return {"i + 1": "-i - 1"}.get(i, f"-{i}")
+def weight(i: str) -> Operand:
+    """Return i as a factor."""
+    first, sign, second = i.partition(" + ") if "+" in i else i.partition(" - ")
+    return (sign.strip(), first, second) if sign else i
 
 
 class Term(NamedTuple):
@@ -93,10 +97,16 @@ class Sums:
         own = [Statement((f"double s[{len(self.places)}];",))] * bool(self.places)
         return Parts(sums=[*own, *(store(to, 0.0) for to in self.places.values())])
 
-    def terms(self, terms: Iterable[Term]) -> list[Item]:
-        """Return a loop that adds up each term."""
-        body = [store(self.places[term], self._of(term, "i"), "+=") for term in terms]
-        return [Block(EACH, (body,), "for")] * bool(body)
+    def terms(self) -> list[Item]:
+        """Return loops that add up the terms of each sum in their order, four in a turn.
+
+        A sum is in memory: a turn reads and writes it once.
+        """
+        four, one = [], []
+        for term, to in self.places.items():
+            four.append(store(to, reduce(plus, (self._of(term, i) for i in FOUR), to)))
+            one.append(store(to, self._of(term, "i"), "+="))
+        return [Block(EACH_FOURTH, (four,), "for"), Block(EACH_LEFT, (one,), "for")] * bool(four)
 
     def parts(self, is_array: bool, within: Within, newest: Newest | None) -> Parts:
         """Return statements that add up two terms at once: half the additions wait for others.
@@ -132,13 +142,13 @@ class Sums:
 
     def _of(self, term: Term, i: str, newest: Newest | None = None) -> Operand:
         """Term i of a sum."""
-        x, y = self.row(term.x, before(i) if term.is_rate else i), self.row(term.y, rest(i))
+        x, y = self.row(term.x, BEFORE[i] if term.is_rate else i), self.row(term.y, rest(i))
         if newest is not None and i == "1":
             y = newest.of(term.y)
         if newest is not None and i == "k - 1" and not term.is_rate:
             x = newest.of(term.x)
         if term.is_weighted:
-            x = "*", WEIGHTS.get(i, i), x
+            x = "*", weight(i), x
         return "*", x, y
 
 
@@ -182,8 +192,8 @@ class Pairs:
 
             def product(i: str, a: int = a, b: int = b, is_rate: bool = one.is_rate) -> str:
                 """Term i of both."""
-                x = f"{at}[{before(i) if is_rate else i}][{a}]"
-                y = f"{at}[1][{b}]" if i == "k - 1" else f"to{at[2:]}[{behind(i)}][{b}]"
+                x = f"{at}[{BEFORE[i] if is_rate else i}][{a}]"
+                y = f"{at}[1][{b}]" if i == "k - 1" else f"to{at[2:]}[-{i.replace('+', '-')}][{b}]"
                 if newest is not None and i == "1":
                     y = newest.of_pair(at, b)
                 if newest is not None and i == "k - 1" and not is_rate:
