@@ -156,13 +156,15 @@ class Series:
         self.opened.write(self.still, self.condition, moves=False)
         self.opened.write(self.start, self.condition, moves=True)
 
+    def _divisions(self) -> list[Item]:
+        """Divide by k in front of the sums, which need not wait for it."""
+        texts = ["const double over_k = 1.0 / k;"] * self.has_over_k
+        texts += ["const double h = origin->time_scale / k;"] * bool(self.rates)
+        return [Statement((text,)) for text in texts]
+
     def _integrals(self, newest: Newest | None) -> list[Item]:
         """Write coefficients of states; newest: variables for those before."""
         found: list[Item] = []
-        if self.has_over_k:
-            found.append(Statement(("const double over_k = 1.0 / k;",)))
-        if self.rates:
-            found.append(Statement(("const double h = origin->time_scale / k;",)))
         for i, rate in enumerate(self.rates.values()):
             if rate.moves:
                 is_new = rate in self.rates and self.rows[rate] < i  # has coefficient k already
@@ -277,7 +279,7 @@ class Series:
                 parts["later"] = newest.through(parts["later"])
                 found.own = newest.through(found.own)
                 found.start += newest.begin()
-        parts["sums"], parts["terms"] = found.sums, found.terms
+        parts["sums"], parts["terms"] = [*self._divisions(), *found.sums], found.terms
         for name, before, behind in (
             ("still", [], found.still),
             ("start", [], found.start),
