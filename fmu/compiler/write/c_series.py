@@ -268,7 +268,7 @@ class Series:
         is_long = not self.opened.conditions and sum(map(len, parts.values())) >= SHORTEST
         if self.is_wide:
             found = self.sums.in_array()
-            found.terms = self.sums.terms()
+            found.terms = self.sums.terms(self.forms)
         else:
             newest = None if is_long else Newest(self._row)
             found = self.sums.parts(

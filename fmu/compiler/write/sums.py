@@ -15,6 +15,8 @@ from .newest import Newest
 from .statements import Block, Item, Operand, Place, Statement, store
 
 FEWEST_IN_PAIRS = 2  # sums that gain by adding up two at once
+FEWEST_ALIKE = 20  # sums of a form, a mean, that gain by adding up four terms at once
+EACH = "int i = 1; i < k; i++"
 EACH_FOURTH = "int i = 1; i + 3 < k; i += 4"
 EACH_LEFT = "int i = (k - 1) / 4 * 4 + 1; i < k; i++"
 EACH_SECOND = "int i = {}; i + 1 < k; i += 2"
@@ -97,16 +99,20 @@ class Sums:
         own = [Statement((f"double s[{len(self.places)}];",))] * bool(self.places)
         return Parts(sums=[*own, *(store(to, 0.0) for to in self.places.values())])
 
-    def terms(self) -> list[Item]:
-        """Return loops that add up the terms of each sum in their order, four in a turn.
+    def terms(self, form: Mapping[Value, tuple]) -> list[Item]:
+        """Return loops that add up the terms of each sum in their order.
 
-        A sum is in memory: a turn reads and writes it once.
+        A sum is in memory. Where many of a form are side by side, a turn with four terms reads and
+        writes it once; shorter vectors lose more by longer code.
         """
         four, one = [], []
         for term, to in self.places.items():
             four.append(store(to, reduce(plus, (self._of(term, i) for i in FOUR), to)))
             one.append(store(to, self._of(term, "i"), "+="))
-        return [Block(EACH_FOURTH, (four,), "for"), Block(EACH_LEFT, (one,), "for")] * bool(four)
+        forms = {(term.is_weighted, *(form[v] for v in term[:2])) for term in self.places}
+        if not one or len(one) < FEWEST_ALIKE * len(forms):
+            return [Block(EACH, (one,), "for")] * bool(one)
+        return [Block(EACH_FOURTH, (four,), "for"), Block(EACH_LEFT, (one,), "for")]
 
     def parts(self, is_array: bool, within: Within, newest: Newest | None) -> Parts:
         """Return statements that add up two terms at once: half the additions wait for others.
