@@ -254,11 +254,7 @@ struct instance *fmi_enter(struct fmi_instance *fmi, unsigned call) {
     return fmi->instance;
 }
 
-bool fmi_check_arrays(struct fmi_instance *fmi, unsigned call, size_t count, const void *first,
-                      const void *second) {
-    if (count == 0 || (first != NULL && second != NULL)) {
-        return true;
-    }
+bool fmi_refuse_arrays(struct fmi_instance *fmi, unsigned call, size_t count) {
     fmi_fail(fmi, "%s: an array is NULL, %zu values are expected", fmi->adapter->rules[call].name,
              count);
     return false;

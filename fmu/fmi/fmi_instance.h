@@ -119,20 +119,22 @@ MUST_CHECK struct instance *fmi_enter(struct fmi_instance *fmi, unsigned call);
  * refused the call. */
 MUST_CHECK NONNULL bool fmi_refuse_in_logger(struct fmi_instance *fmi, const char *call);
 
+/* Fails as fmi_fail: an array of a call is NULL. Returns false. */
+NONNULL bool fmi_refuse_arrays(struct fmi_instance *fmi, unsigned call, size_t count);
+
 /* Returns true if neither array is NULL, unless count is 0. Otherwise fails as fmi_fail. */
-MUST_CHECK NONNULL_ARGUMENTS(1) bool fmi_check_arrays(struct fmi_instance *fmi, unsigned call,
-                                                      size_t count, const void *first,
-                                                      const void *second);
+MUST_CHECK static inline bool fmi_check_arrays(struct fmi_instance *fmi, unsigned call,
+                                               size_t count, const void *first,
+                                               const void *second) {
+    return (first != NULL && second != NULL) || count == 0 || fmi_refuse_arrays(fmi, call, count);
+}
 
 /* Begins a call with two arrays of count values: fmi_enter and fmi_check_arrays. */
 MUST_CHECK static inline struct instance *fmi_enter_with(struct fmi_instance *fmi, unsigned call,
                                                          size_t count, const void *first,
                                                          const void *second) {
     struct instance *instance = fmi_enter(fmi, call);
-    const bool is_right = (first != NULL && second != NULL) || count == 0;
-    return instance != NULL && (is_right || fmi_check_arrays(fmi, call, count, first, second))
-               ? instance
-               : NULL;
+    return instance != NULL && fmi_check_arrays(fmi, call, count, first, second) ? instance : NULL;
 }
 
 /* Does the same as fmi_result for a status other than STATUS_OK. */

@@ -493,6 +493,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     if (entered == NULL || !fmi_check_arrays(instance, call, 1, earlyReturn, lastSuccessfulTime)) {
         return fmi3Error;
     }
+    const double end = currentCommunicationPoint + communicationStepSize;
     const enum status status =
         instance_do_step(entered, currentCommunicationPoint, communicationStepSize, &fmi->options);
     if (status != STATUS_OK && status != STATUS_ENDED) {
@@ -502,8 +503,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         fmi->base.kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(entered);
     *terminateSimulation = status == STATUS_ENDED;
     *lastSuccessfulTime = instance_time(entered);
-    *earlyReturn = fmi->early_return_allowed &&
-                   *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
+    *earlyReturn = fmi->early_return_allowed && *lastSuccessfulTime < end;
     return fmi3OK;
 }
 

@@ -140,7 +140,7 @@ def rows(turns: int, loops: ctypes.CDLL) -> list[dict]:
         peer = by_heyoka(PAIRS.get(name, fmu.with_suffix(".toml")), step, start)
         named, of_peer = f"{name}, taylor to heyoka", 10.0 * tolerance
         exact = solutions[name] = peer(1e-19, np.longdouble)[1]
-        judged = exact, 1.0, (own, tolerance)
+        judged = exact, 0.9, (own, tolerance)
         while (one := row(named, 1, *judged, (peer, of_peer)))["error_of_peer"] > one["error"]:
             of_peer *= 10.0**-0.25
         found.append(row(named, turns, *judged, (peer, of_peer)))

@@ -12,8 +12,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from tests.equations.compiled import LENGTH, Model
+from tests.equations.compiled import LENGTH, Model, c_model, read_text
 from tests.equations.examples import MODELS
+from tests.support.paths import ROOT
 
 BOUND = 1e-13
 WIDE = 10**9  # values that move
@@ -214,6 +215,24 @@ def test_a_series_with_values_side_by_side_is_the_same(
     wide = Model(tmp_path, text)
     assert "const at)" in (tmp_path / "equations.c").read_text()
     np.testing.assert_allclose(wide.series(*given), model.series(*given), rtol=1e-12, atol=1e-14)
+
+
+def test_sums_of_one_form_are_side_by_side(tmp_path: Path) -> None:
+    """Compilers shuffle vectors where sums of several forms take turns in the array."""
+    text = (ROOT / "tests" / "bench" / "pleiades.toml").read_text(encoding="utf-8")
+    source = c_model.source(read_text(tmp_path, text))
+    assert re.search(r" s\[\d+ \+ r0\] = s\[\d+ \+ r0\] \+ ", source)  # four terms at once
+    assert not re.search(r" s\[\d+ \+ \d+ \* r0\]", source)
+
+
+def test_a_rate_may_be_a_state_before_its_own(tmp_path: Path) -> None:
+    states = ['x = { derivative = "v" }', 'v = { derivative = "-x * x * v" }']
+    found = []
+    for folder, order in (("after", states), ("before", states[::-1])):
+        (tmp_path / folder).mkdir()
+        model = Model(tmp_path / folder, "\n".join(['name = "M"', "[states]", *order]))
+        found.append(model.series(model.values(x=0.7, v=0.4), 0.0, 0.5, np.zeros((1, 4)), 12))
+    np.testing.assert_array_equal(found[0], found[1][::-1])
 
 
 def test_1_over_a_denominator_may_be_infinite(tmp_path: Path) -> None:

@@ -31,6 +31,8 @@ from .branches import AtOrigin, OfOrder, Opened, plan_with_partials, within
 from .c_code import WITHOUT_DERIVATIVES, Code, Leaves, called
 from .guards import Path, Plan, cost, with_guards
 from .loops import OF_MODELS, SHORTEST, printed
+from .newest import Newest
+from .scaled import scaled, times
 from .statements import Block, Item, Operand, Place, Statement, store
 from .sums import Sums, Term
 
@@ -45,7 +47,8 @@ USED = "inputs that values are multiplied by are used"
 FLAT = 4  # degree of divisors whose small values show in the states' own terms, not between points
 
 
-OF_SERIES = OF_MODELS | {"row", "origin", "last", "i", "k", "h", "at", "s", "over_k"}
+OWN = ("row", "origin", "last", "before", "i", "k", "h", "at", "to", "s", "over_k")
+OF_SERIES = OF_MODELS.union(OWN)
 
 
 class Series:
@@ -104,17 +107,7 @@ class Series:
             self._write_branches(plan, needed)
         else:
             self._write_all(needed)
-        self.integrals: list[Item] = []
-        if self.has_over_k:
-            self.integrals.append(Statement(("const double over_k = 1.0 / k;",)))
-        if rates:
-            self.integrals.append(Statement(("const double h = origin->time_scale / k;",)))
-        for i, rate in enumerate(roots[: len(rates)]):
-            if rate.moves:
-                last = "*", "h", self._row(rate, "k - 1")
-            else:
-                last = "if", ("==", "k", "1"), ("*", "h", self.still.of(rate)), 0.0
-            self.integrals.append(store(Place("row[", i, "][k]"), last))
+        self.integrals = self._integrals(None)
 
     def _in_branches(self, roots: list[Value]) -> tuple[list[Value], Plan, list[Value]]:
         """Return roots, the plan of those that move, and inputs whose products are in a branch."""
@@ -162,6 +155,25 @@ class Series:
         self.later.statements = [*lines["k"], *Blocks(OfOrder(self), moving).written()[1]]
         self.opened.write(self.still, self.condition, moves=False)
         self.opened.write(self.start, self.condition, moves=True)
+
+    def _divisions(self) -> list[Item]:
+        """Divide by k in front of the sums, which need not wait for it."""
+        texts = ["const double over_k = 1.0 / k;"] * self.has_over_k
+        texts += ["const double h = origin->time_scale / k;"] * bool(self.rates)
+        return [Statement((text,)) for text in texts]
+
+    def _integrals(self, newest: Newest | None) -> list[Item]:
+        """Write coefficients of states; newest: variables for those before."""
+        found: list[Item] = []
+        for i, rate in enumerate(self.rates.values()):
+            if rate.moves:
+                is_new = rate in self.rates and self.rows[rate] < i  # has coefficient k already
+                is_kept = newest is not None and not is_new
+                last = "*", "h", newest.of(rate) if is_kept else self._row(rate, "k - 1")
+            else:
+                last = "if", ("==", "k", "1"), ("*", "h", self.still.of(rate)), 0.0
+            found.append(store(Place("row[", i, "][k]"), last))
+        return found
 
     def _cost(self, value: Value) -> int:
         """Estimate how long a coefficient takes."""
@@ -240,7 +252,7 @@ class Series:
     def parts(self) -> dict[str, list[str]]:
         """What equations.c.in has blocks for."""
         if self.is_wide:
-            self.sums.sort(lambda value: (self.forms[value], self.order[value]))
+            self.sums.sort(self.forms, self.order)
             width = len(self.columns)
             own = f"double(*const at)[{width}] = (double(*)[{width}])(void *)row[{len(self.rows)}];"
             self.still.statements.insert(0, Statement((own,)))
@@ -256,12 +268,18 @@ class Series:
         is_long = not self.opened.conditions and sum(map(len, parts.values())) >= SHORTEST
         if self.is_wide:
             found = self.sums.in_array()
-            found.terms = self.sums.terms(self.sums.places)
+            found.terms = self.sums.terms(self.forms)
         else:
+            newest = None if is_long else Newest(self._row)
             found = self.sums.parts(
-                is_long, lambda path, items: within(path, items, self.condition)
+                is_long, lambda path, items: within(path, items, self.condition), newest
             )
-        parts["sums"], parts["terms"] = found.sums, found.terms
+            if newest is not None:
+                parts["integrals"] = newest.through(self._integrals(newest))
+                parts["later"] = newest.through(parts["later"])
+                found.own = newest.through(found.own)
+                found.start += newest.begin()
+        parts["sums"], parts["terms"] = [*self._divisions(), *found.sums], found.terms
         for name, before, behind in (
             ("still", [], found.still),
             ("start", [], found.start),
@@ -269,7 +287,9 @@ class Series:
             ("later", [], found.own),
         ):
             parts[name] = [*before, *parts[name], *behind]
-        taken = OF_SERIES.union(*({f"s{i}", f"p{i}"} for i in range(len(self.sums.places))))
+        count = 2 * len(self.sums.places) + len(self.rows)
+        names = ("s", "p", "e", "n", "at_", "to_")
+        taken = OF_SERIES.union(f"{name}{i}" for name in names for i in range(count))
         # a place's name would be a load in each turn, where an operation can read memory
         lines = printed(*parts.values(), taken=taken, is_long=is_long, has_named_places=False)
         return dict(zip(parts, lines, strict=True))
@@ -562,62 +582,6 @@ def forms(values: Iterable[Value]) -> dict[Value, tuple[int, int]]:
         moving = (x[0] for x, v in zip(given, value.arguments, strict=True) if v.moves)
         found[value] = 1 + max(moving, default=0), numbers.setdefault(form, len(numbers))
     return found
-
-
-def times(graph: Graph, a: Value, b: Value) -> Value:
-    """The product of a factor that does not move and a value, with their signs in front."""
-    product = graph.simple("*", unsigned(a), unsigned(b))
-    return product if (a.op == "negative") == (b.op == "negative") else graph.negative(product)
-
-
-def scaled(graph: Graph, roots: list[Value], is_wide: bool) -> list[Value]:
-    """The roots with factors that do not move in front of products: (a x) y as a (x y).
-
-    is_wide: signs and factors of quotients are in front, too, and of two differences x - y and
-    y - x there is one.
-    """
-    found: dict[Value, tuple[Value, Value]] = {}  # factor and what it is the factor of
-    differences: dict[tuple[Value, Value], Value] = {}
-    one = graph.number(1.0)
-    product = partial(times, graph) if is_wide else partial(graph.simple, "*")
-    for value in in_order(roots):
-        given = [found[argument] for argument in value.arguments]
-        moving = [pair for pair, x in zip(given, value.arguments, strict=True) if x.moves]
-        if value.op == "*" and moving:
-            factors = [
-                f if x.moves else x for (f, _), x in zip(given, value.arguments, strict=True)
-            ]
-            bases = [base for _, base in moving]
-            found[value] = product(*factors), reduce(partial(graph.value, "*"), bases)
-        elif value.op == "negative" and moving:
-            found[value] = graph.negative(given[0][0]), given[0][1]
-        elif moving:
-            op, sign = value.op, one
-            if is_wide and op == "/" and value.arguments[0].moves:
-                sign, given[0] = given[0][0], (one, given[0][1])
-            whole = [product(*pair) for pair in given]
-            if op == "if" and (common_term := _common_term(*whole[1:])) is not None:
-                rest = graph.value("if", whole[0], *(x.arguments[0] for x in whole[1:]))
-                found[value] = one, graph.value("+", rest, common_term)
-                continue
-            last = whole[-1]
-            if is_wide and op in ("+", "-") and last.op == "negative" and last.moves:
-                op, whole[-1] = "-" if op == "+" else "+", last.arguments[0]
-            if is_wide and op == "-" and all(x.moves for x in whole):
-                if (*reversed(whole),) in differences:
-                    sign, whole = graph.negative(one), [*reversed(whole)]
-                differences[*whole] = last
-            found[value] = sign, graph.value(op, *whole, name=value.name)
-        else:
-            found[value] = one, value
-    return [product(*found[root]) for root in roots]
-
-
-def _common_term(first: Value, second: Value) -> Value | None:
-    """Return what moves in two sums whose other terms rest."""
-    is_same = first.op == second.op == "+" and first.arguments[1] is second.arguments[1]
-    rests = [value.arguments[0] for value in (first, second)] if is_same else []
-    return first.arguments[1] if is_same and not any(rest.moves for rest in rests) else None
 
 
 def _zeros(root: Value) -> int:

@@ -3,20 +3,47 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import combinations
 from typing import NamedTuple
 
 from ..graph.graph import Value
 from .guards import Path, common
+from .newest import Newest
 from .statements import Block, Item, Operand, Place, Statement, store
 
-FEWEST_IN_PAIRS = 4  # sums that gain by adding up two at once
-FEWEST_IN_BRANCH = 2  # likewise, in a loop of their own
+FEWEST_IN_PAIRS = 2  # sums that gain by adding up two at once
+FEWEST_ALIKE = 20  # sums of a form, a mean, that gain by adding up four terms at once
 EACH = "int i = 1; i < k; i++"
-EACH_SECOND = "int i = 1; i + 1 < k; i += 2"
+EACH_FOURTH = "int i = 1; i + 3 < k; i += 4"
+EACH_LEFT = "int i = (k - 1) / 4 * 4 + 1; i < k; i++"
+EACH_SECOND = "int i = {}; i + 1 < k; i += 2"
 Within = Callable[[Path, list[Item]], list[Item]]  # statements in the blocks of a path
+
+
+# terms of a sum of which loops are made
+WHERE = ("1", "2", "i", "i + 1", "k - 1")
+FOUR = ("i", "i + 1", "i + 2", "i + 3")
+BEFORE = {"1": "0", "2": "1", "i": "i - 1", "i + 1": "i", "i + 2": "i + 1", "i + 3": "i + 2"}
+BEFORE |= {"k - 1": "k - 2"}
+
+
+def plus(a: Operand, b: Operand) -> Operand:
+    """Return the sum."""
+    return "+", a, b
+
+
+def rest(i: str) -> str:
+    """Return k - i."""
+    return "1" if i == "k - 1" else "k - " + i.replace("+", "-")
+
+
+def weight(i: str) -> Operand:
+    """Return i as a factor."""
+    first, sign, second = i.partition(" + ") if "+" in i else i.partition(" - ")
+    return (sign.strip(), first, second) if sign else i
 
 
 class Term(NamedTuple):
@@ -54,11 +81,12 @@ class Sums:
         self.paths[term] = common(self.paths.get(term, path), path)
         return found
 
-    def sort(self, place: Callable[[Value], tuple[object, ...]]) -> None:
-        """Put sums of one form side by side, by the places of values."""
+    def sort(self, form: Mapping[Value, tuple], order: Mapping[Value, int]) -> None:
+        """Put sums of one form side by side, in the order of their factors."""
 
         def key(term: Term) -> tuple[object, ...]:
-            return term.is_weighted, [place(v) for v in term[:2]]
+            factors = term[:2]
+            return term.is_weighted, [form[v] for v in factors], [order[v] for v in factors]
 
         self.places = {term: self.places[term] for term in sorted(self.places, key=key)}
         for i, to in enumerate(self.places.values()):
@@ -71,21 +99,36 @@ class Sums:
         own = [Statement((f"double s[{len(self.places)}];",))] * bool(self.places)
         return Parts(sums=[*own, *(store(to, 0.0) for to in self.places.values())])
 
-    def terms(self, terms: Iterable[Term]) -> list[Item]:
-        """Return a loop that adds up each term."""
-        body = [store(self.places[term], self._of(term), "+=") for term in terms]
-        return [Block(EACH, (body,), "for")] * bool(body)
+    def terms(self, form: Mapping[Value, tuple]) -> list[Item]:
+        """Return loops that add up the terms of each sum in their order.
 
-    def parts(self, is_array: bool, within: Within) -> Parts:
-        """Return statements that add up two terms at once: half the additions wait for others."""
+        A sum is in memory. Where many of a form are side by side, a turn with four terms reads and
+        writes it once; shorter vectors lose more by longer code.
+        """
+        four, one = [], []
+        for term, to in self.places.items():
+            four.append(store(to, reduce(plus, (self._of(term, i) for i in FOUR), to)))
+            one.append(store(to, self._of(term, "i"), "+="))
+        forms = {(term.is_weighted, *(form[v] for v in term[:2])) for term in self.places}
+        if not one or len(one) < FEWEST_ALIKE * len(forms):
+            return [Block(EACH, (one,), "for")] * bool(one)
+        return [Block(EACH_FOURTH, (four,), "for"), Block(EACH_LEFT, (one,), "for")]
+
+    def parts(self, is_array: bool, within: Within, newest: Newest | None) -> Parts:
+        """Return statements that add up two terms at once: half the additions wait for others.
+
+        newest: variables for coefficients k - 1, where sums outside of branches begin with them.
+        """
         parts = self.in_array() if is_array else Parts()
         groups: dict[Path, list[Term]] = defaultdict(list)
         for term in self.places:
             groups[self.paths[term]].append(term)
         for number, path in enumerate(sorted(groups, key=len)):
-            single, loop = groups[path], Loop([], [])
-            if not is_array and len(single) >= (FEWEST_IN_BRANCH if path else FEWEST_IN_PAIRS):
-                pairs = Pairs(self, single, f"at_{number}" if number else "at", len(parts.sums))
+            single, loop = groups[path], Loop()
+            own_newest = None if path else newest
+            if not is_array and len(single) >= FEWEST_IN_PAIRS:
+                at = f"at_{number}" if number else "at"
+                pairs = Pairs(self, single, at, len(parts.sums), own_newest)
                 single, loop = pairs.single, pairs.loop
                 parts.still += pairs.declared
                 parts.start += within(path, pairs.begin) if pairs.begin else []
@@ -95,43 +138,52 @@ class Sums:
             if not is_array:
                 parts.sums += [Statement(("double ", self.places[t], " = 0.0;")) for t in single]
             for term in single:
-                to, (one, two) = self.places[term], (self._of(term, further) for further in (0, 1))
-                loop.terms.append(store(to, one, "+="))
-                loop.both.append(store(to, ("+", one, two), "+="))
-            last = Statement(("const int i = k - 1;",))
-            items = [
-                Block(EACH_SECOND, (loop.both,), "for"),
-                Block("k % 2 == 0", ([last, *loop.terms],)),
-            ]
-            parts.terms += within(path, items)
+                to = self.places[term]
+                of = {where: self._of(term, where, own_newest) for where in WHERE}
+                loop.first.append(store(to, ("+", of["1"], of["2"]), "+="))
+                loop.both.append(store(to, ("+", of["i"], of["i + 1"]), "+="))
+                loop.last.append(store(to, of["k - 1"], "+="))
+            parts.terms += within(path, loop.blocks(own_newest is not None))
         return parts
 
-    def _of(self, term: Term, further: int = 0) -> Operand:
-        """Term i of a sum, or the next one."""
-        i, rest = ("i + 1", "k - i - 1") if further else ("i", "k - i")
-        of_x = {"i": "i - 1", "i + 1": "i"}[i] if term.is_rate else i
-        x = self.row(term.x, of_x)
+    def _of(self, term: Term, i: str, newest: Newest | None = None) -> Operand:
+        """Term i of a sum."""
+        x, y = self.row(term.x, BEFORE[i] if term.is_rate else i), self.row(term.y, rest(i))
+        if newest is not None and i == "1":
+            y = newest.of(term.y)
+        if newest is not None and i == "k - 1" and not term.is_rate:
+            x = newest.of(term.x)
         if term.is_weighted:
-            x = "*", ("+", "i", "1") if further else "i", x
-        return "*", x, self.row(term.y, rest)
+            x = "*", weight(i), x
+        return "*", x, y
 
 
-class Loop(NamedTuple):
-    """Statements that add one term to each sum, and those that add two."""
+@dataclass
+class Loop:
+    """Statements that add two terms to each sum: the first ones, and others; and the last one."""
 
-    terms: list[Item]
-    both: list[Item]
+    first: list[Item] = field(default_factory=list)
+    both: list[Item] = field(default_factory=list)
+    last: list[Item] = field(default_factory=list)
+
+    def blocks(self, has_newest: bool) -> list[Item]:
+        """Return the blocks; has_newest: the first terms stand in front of the loop."""
+        first = [Block("k > 2", (self.first,))] if has_newest else []
+        others = Block(EACH_SECOND.format(3 if has_newest else 1), (self.both,), "for")
+        return [*first, others, Block("k % 2 == 0", (self.last,))]
 
 
 class Pairs:
     """Two sums at once, with the same bits: their factors stand side by side in an array `at`."""
 
-    def __init__(self, sums: Sums, terms: list[Term], at: str, count: int) -> None:
+    def __init__(
+        self, sums: Sums, terms: list[Term], at: str, count: int, newest: Newest | None
+    ) -> None:
         columns: dict[tuple[Value, Value], int] = {}
         left = [term for term in terms if not term.is_weighted]
         self.sums: list[Item] = []
         self.after: list[Item] = []
-        self.loop = Loop([], [])
+        self.loop = Loop()
 
         def cost(pair: tuple[Term, Term]) -> tuple[int, bool]:
             """Count the columns that it adds; then prefer two sums with the same factor."""
@@ -142,24 +194,43 @@ class Pairs:
             one, other = best = min(pairs, key=cost)
             left = [term for term in left if term not in best]
             a, b = (columns.setdefault((one[i], other[i]), len(columns)) for i in (0, 1))
-            name, before = f"p{count + len(self.sums)}", " - 1" * one.is_rate
-            product = f"{at}[i{before}][{a}].of LANE * {at}[k - i][{b}].of LANE"
-            next_x = f"{at}[i{'' if before else ' + 1'}][{a}].of LANE"
-            after_it = f"{next_x} * {at}[k - i - 1][{b}].of LANE"
+            name = f"p{count + len(self.sums)}"
+
+            def product(i: str, a: int = a, b: int = b, is_rate: bool = one.is_rate) -> str:
+                """Term i of both."""
+                x = f"{at}[{BEFORE[i] if is_rate else i}][{a}]"
+                y = f"{at}[1][{b}]" if i == "k - 1" else f"to{at[2:]}[-{i.replace('+', '-')}][{b}]"
+                if newest is not None and i == "1":
+                    y = newest.of_pair(at, b)
+                if newest is not None and i == "k - 1" and not is_rate:
+                    x = newest.of_pair(at, a)
+                return f"{x}.of LANE * {y}.of LANE"
+
             self.sums.append(Statement((f"struct pair {name} = {{{{0.0, 0.0}}}};",)))
-            self.loop.terms.append(Statement((f"EACH {name}.of LANE += {product};",)))
-            self.loop.both.append(Statement((f"EACH {name}.of LANE += {product} + {after_it};",)))
+            for to, terms_of in (
+                (self.loop.first, ("1", "2")), (self.loop.both, ("i", "i + 1")),
+                (self.loop.last, ("k - 1",)),
+            ):  # fmt: skip
+                both = " + ".join(product(i) for i in terms_of)
+                to.append(Statement((f"EACH {name}.of LANE += {both};",)))
             for i, term in enumerate(best):
                 of = f" = {name}.of[{i}];"
                 self.after.append(Statement(("const double ", sums.places[term], of)))
         self.single = [term for term in terms if term in left or term.is_weighted]
         self.own: list[Item] = []
+        self.begin: list[Item] = []
         for (a, b), i in columns.items():
             of_a, of_b = (sums.row(value, "k") for value in (a, b))
             parts = (f"{at}[k][{i}] = (struct pair){{{{", of_a, ", ", of_b, "}};")
+            self.begin.append(Statement(parts))
+            if newest is not None:
+                newest.of(a), newest.of(b)
+                parts = (newest.given_to(at, i), *parts)
             self.own.append(Statement(parts))
         self.declared: list[Item] = []
-        self.begin: list[Item] = []
         if columns:
-            self.declared = [Statement((f"struct pair {at}[SERIES_LENGTH][{len(columns)}];",))]
-            self.begin = [Block("int k = 0; k == 0 || k < first; k++", (self.own,), "for")]
+            width = len(columns)
+            pointer = f"const struct pair(*const to{at[2:]})[{width}] = {at} + k;"
+            self.sums.append(Statement((pointer,)))
+            self.declared = [Statement((f"struct pair {at}[SERIES_LENGTH][{width}];",))]
+            self.begin = [Block("int k = 0; k == 0 || k < first; k++", (self.begin,), "for")]
