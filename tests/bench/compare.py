@@ -374,7 +374,11 @@ def miss(row: dict) -> str:
 
 def summary(report: dict) -> str:
     """Return the table of ratios to the plain loop, and a list of the targets that are missed."""
-    rows = [row for row in report["rows"] if row["group"] in ("steps", "models") and "us" in row]
+    rows = [
+        row
+        for row in report["rows"]
+        if row["group"] in ("steps", "models", "loop") and "ratio" in row
+    ]
     ratios = {(row["run"], row.get("column", row["work"])): row["ratio"] for row in rows}
     cells = [
         [run, *(number(ratios.get((run, work))) for work in WORKS.values())]
