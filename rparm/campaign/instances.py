@@ -1,4 +1,4 @@
-"""Instances of a job's components, which make one run after the other: reset, not made anew."""
+"""Instances of a job's components, which are reset between runs."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
@@ -27,6 +27,10 @@ class Instances(AbstractContextManager["Instances"], ABC):
 
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Reset all instances after a run; UserError if that fails."""
 
     @abstractmethod
     def run(self, point: np.ndarray, record: np.ndarray, growth: np.ndarray) -> list[int]:
@@ -60,7 +64,6 @@ class Alone(Instances):
         (component,) = job.components
         instance = self._fmus[component.name].instance(component.name)
         self._instance = self._stack.enter_context(instance)
-        self._is_new = True
         switches = job.switches.names
         self.loop = one_component(self._instance, job.reals.names, switches, job.watched)
         self._scheduled = job.switches.values.astype(np.int64)
@@ -69,20 +72,20 @@ class Alone(Instances):
             self._tangent = Tangent(*job.tangent)
             self.loop.carry(self._tangent)
 
+    def reset(self) -> None:
+        self._instance.reset()
+
     def run(self, point: np.ndarray, record: np.ndarray, growth: np.ndarray) -> list[int]:
         self._initialize(point)
         times, loop = self._job.times, self.loop
         record[0] = loop.values[: loop.width]
-        given = self._held[1:], self._scheduled[1:], record
+        given = self._held[:-1], self._scheduled[:-1], record
         loop.run(times[1:], *given, growth=growth if self._tangent is not None else None)
         return self._integers([self._instance])
 
     def _initialize(self, point: np.ndarray) -> None:
         """Go to the first communication point, outputs read."""
         job, instance, loop = self._job, self._instance, self.loop
-        if not self._is_new:
-            instance.reset()
-        self._is_new = False
         instance.set_up(job.start, job.stop, job.tolerance)
         for name, value in job.components[0].values.items():
             instance.set(name, value)
@@ -92,7 +95,7 @@ class Alone(Instances):
         loop.start(job.start)
         loop.values[loop.state.first_driven :] = self._held[0]
         loop.set_inputs("in initialization")
-        loop.transfer(self._scheduled[0])
+        loop.set_switches(self._scheduled[0])
         instance.exit_initialization()
         loop.read()
         if self._tangent is not None:
@@ -129,17 +132,17 @@ class Connected(Instances):
             also=[split(name, models) for name in job.watched],
             signals=signals, rates=job.wiring.rates,
         )  # fmt: skip
-        self._master, self._is_new = self._stack.enter_context(master), True
+        self._master = self._stack.enter_context(master)
         self._columns = [master.names.index(name) for name in job.watched]
+
+    def reset(self) -> None:
+        self._master.reset()
 
     def run(self, point: np.ndarray, record: np.ndarray, growth: np.ndarray) -> list[int]:
         job, master = self._job, self._master
         values = {component.name: dict(component.values) for component in job.components}
         for target, value in self._targets(point):
             values[job.components[target.component].name][target.variable] = value
-        if not self._is_new:
-            master.reset()
-        self._is_new = False
         master.initialize(job.start, job.stop, values)
         master.watch(job.times, self._columns, rows=record)
         return self._integers([master.components[c.name].instance for c in job.components])

@@ -32,11 +32,12 @@ class Rows:
 
 
 class Runner(AbstractContextManager["Runner"]):
-    """Instances of all components, of FMUs by their hash; a context manager that frees them."""
+    """Makes runs, and what is measured of them; a context manager that frees its instances."""
 
     def __init__(self, job: Job, fmus: Mapping[str, Fmu]) -> None:
         self._job, self._fmus = job, fmus
         self._instances: Instances | None = None
+        self._are_used = False
         self._record = np.empty((len(job.times), len(job.watched)))
         self._growth = np.empty(0 if job.tangent is None else job.steps)
         self._integers: list[int] = []  # at the end of the last run
@@ -72,14 +73,27 @@ class Runner(AbstractContextManager["Runner"]):
 
     def _run(self, point: np.ndarray) -> str:
         """Make one run; why it failed, or an empty text."""
+        if self._are_used:
+            self._reset()
+        self._are_used = True
         try:
             self._integers = self.instantiate().run(point, self._record, self._growth)
             return ""
         except UserError as error:
-            with suppress(UserError):  # the run has failed already: instances are not used again
-                self.__exit__(None, None, None)
-            self._instances = None
+            self._drop()  # they are not used again
             return one_line(error)[:LONGEST_REASON]
+
+    def _reset(self) -> None:
+        """Reset the instances; those that cannot be reset are made anew."""
+        try:
+            self.instantiate().reset()
+        except UserError:
+            self._drop()
+
+    def _drop(self) -> None:
+        with suppress(UserError):
+            self.__exit__(None, None, None)
+        self._instances, self._are_used = None, False
 
 
 @contextmanager

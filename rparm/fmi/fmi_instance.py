@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
-from ctypes import Array, byref, c_double, c_int, c_uint, c_void_p
+from ctypes import Array, byref, c_double, c_uint, c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
@@ -24,7 +24,6 @@ from rparm.loop.structures import Polynomials
 from rparm.project import check_current_folder
 
 OK, DISCARD, ERROR, FATAL = 0, 2, 3, 4  # from DISCARD on, a status stops a run
-TERMINATED = 100  # no status of FMI: the FMU asks to end the simulation
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")  # the last: FMI 2.0
 MESSAGES_KEPT = 20
 ENDS = re.compile("the simulation ends (at t = .*)")  # what FMUs of this project say
@@ -54,14 +53,6 @@ class Reals:
     view: np.ndarray  # (len(names),) in the variables' units
     get: Call
     set: Call
-
-
-@dataclass(frozen=True, eq=False)
-class OutputDerivatives:
-    """Derivatives of some Real outputs with respect to time; FMICallException if `get` fails."""
-
-    view: np.ndarray  # (outputs,) in the outputs' units per power of s
-    get: Call
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,17 +287,6 @@ class Instance(ABC):
     @abstractmethod
     def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
         """Return calls that get and set Real variables."""
-
-    def output_derivatives(self, names: Sequence[str], order: int) -> OutputDerivatives:
-        """Return derivatives of one order of Real outputs, to get together, many times."""
-        values, numbers = doubles(len(names))
-        references, orders = self._references(names), (c_int * len(names))(*[order] * len(names))
-        call = self._derivative_call(references, orders, values) if names else no_call
-        return OutputDerivatives(numbers, call)
-
-    @abstractmethod
-    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
-        """Call that gets derivatives of Real outputs."""
 
     def partials(self, unknowns: Sequence[str], knowns: Sequence[str]) -> np.ndarray:
         """Return the partial derivatives of variables by states and inputs, (unknowns, knowns)."""

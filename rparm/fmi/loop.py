@@ -4,8 +4,10 @@ Values of a system are one array: outputs by component, then those that drive in
 FMUs are called by the addresses of their functions; Python components give such functions, too.
 """
 
-import time
-from collections.abc import Callable, Mapping, Sequence
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from ctypes import (
     addressof,
     byref,
@@ -14,7 +16,7 @@ from ctypes import (
     cast,
     sizeof,
 )  # fmt: skip
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -42,9 +44,6 @@ from rparm.loop.structures import (
     Switch,
     TangentState,
 )  # fmt: skip
-
-FIRST_STEPS = 64  # steps without a look at the clock, of FMUs whose speed is not known
-LOOK_EVERY = 0.02  # s, after which Ctrl-C and progress get their turn
 
 
 # ---- Components ----------------------------------------------------------------------------------
@@ -146,7 +145,7 @@ def one_component(
 ) -> "Loop":
     """Return a loop of one instance, whose inputs, Real and discrete, come from outside.
 
-    Its rows are the outputs at the end of each step, before inputs change.
+    What comes from outside holds over a step; its rows are the outputs at the ends of steps.
     """
     count = len(outputs)
     values = np.zeros(count + len(inputs) + 1)  # never empty
@@ -155,7 +154,7 @@ def one_component(
     loop = Loop([component], values[:-1], len(inputs))
     loop.switch([(i, 0, name) for i, name in enumerate(switches)], len(switches))
     loop.record(range(count))
-    loop.state.is_final = loop.state.reads_for_rows = loop.state.reads_rows_early = True
+    loop.state.is_final = loop.state.reads_for_rows = loop.state.inputs_first = True
     return loop
 
 
@@ -275,7 +274,7 @@ class Loop:
     def read_row(self, row: np.ndarray) -> None:
         """Read a row now."""
         if self._library.loop_read_row(byref(self.state), row.ctypes.data):
-            raise self._error()
+            self._fail()
 
     # ---- Steps -----------------------------------------------------------------------------------
 
@@ -298,10 +297,25 @@ class Loop:
             with component.instance.explained(when):
                 component.inputs.set()
 
+    def know_switches(self, scheduled: np.ndarray) -> None:
+        """Take what discrete inputs that follow a schedule have been set to."""
+        for (source, _, _), made in zip(self._wires, self._switches, strict=True):
+            if isinstance(source, int):
+                made.value = scheduled[source]
+
+    def set_switches(self, scheduled: np.ndarray) -> None:
+        """Set all discrete inputs that follow a schedule."""
+        self.know_switches(scheduled)
+        for source, target, name in self._wires:
+            if isinstance(source, int):
+                instance, value = self.components[target].instance, int(scheduled[source])
+                is_boolean = instance.fmu.model.variables[name].type == "Boolean"
+                instance.set(name, bool(value) if is_boolean else value)
+
     def transfer(self, scheduled: np.ndarray) -> list[str]:
         """Set the discrete inputs whose sources have another value, and return their names."""
         if self._library.loop_transfer(byref(self.state), scheduled.ctypes.data) < 0:
-            raise self._error()
+            self._fail()
         return self.switched
 
     @property
@@ -316,7 +330,7 @@ class Loop:
     def follow_slopes(self) -> None:
         """Compute the slopes of inputs and outputs at the present time."""
         if self._library.loop_follow_slopes(byref(self.state)):
-            raise self._error()
+            self._fail()
 
     def run(
         self,
@@ -334,9 +348,9 @@ class Loop:
         ----------
         ends : (n,) s
         driven : (n, driven), float
-            Values from outside, at the ends.
+            Values from outside, at the ends; at the beginnings if inputs come first.
         scheduled : (n, scheduled), int64
-            Discrete values from outside, at the ends.
+            Discrete values from outside, the same.
         rows : (1 + rows, width)
             Recorded behind the first, which is there.
         has_row : (n,), bool
@@ -355,50 +369,75 @@ class Loop:
             if array is not None:
                 given[name] = np.ascontiguousarray(array, kind)
         counts = None if has_row is None else np.cumsum(has_row)
-        self.done, count = 0, FIRST_STEPS
-        while self.done < len(ends):
-            first, begin = self.done, time.perf_counter()
-            here = slice(first, first + count)
-            run = Run(count=len(ends[here]))
-            run.point(**{name: array[here] for name, array in given.items()})
-            if rows is not None:
-                made = first if counts is None or not first else counts[first - 1]
-                run.point(rows=rows[1 + made :])
-            self.done += self._library.loop_advance(byref(self.state), byref(run))
-            if self.done < first + run.count:
-                raise self._error()
-            if time.perf_counter() - begin < LOOK_EVERY:
-                count *= 2
-            if progress is not None:
-                progress(run.count)
+        self.done = 0
+        with self._interruptible():
+            while self.done < len(ends):
+                first, here = self.done, slice(self.done, None)
+                run = Run(count=len(ends) - first)
+                run.point(**{name: array[here] for name, array in given.items()})
+                if rows is not None:
+                    made = first if counts is None or not first else counts[first - 1]
+                    run.point(rows=rows[1 + made :])
+                self.done += self._library.loop_advance(byref(self.state), byref(run))
+                if self.state.failure.status:
+                    self._fail()
+                if progress is not None:
+                    progress(self.done - first)
+
+    @contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        """Let what a signal raises in a function that C calls end the run: ctypes would print it.
+
+        Signals come in the main thread only, at the first instruction of any such function.
+        """
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        before = sys.unraisablehook
+
+        def hook(unraisable: Any) -> None:
+            is_main = threading.current_thread() is threading.main_thread()
+            if is_main and "ctypes" in (unraisable.err_msg or ""):
+                self._raised, self.state.stop = unraisable.exc_value, True
+            else:
+                before(unraisable)
+
+        sys.unraisablehook = hook
+        try:
+            yield
+        finally:
+            sys.unraisablehook = before
 
     # ---- Errors ----------------------------------------------------------------------------------
 
-    def _error(self) -> BaseException:
-        """Return the error of what has failed."""
-        found = self.state.failure
-        if found.phase == HOST:
-            assert self._raised is not None
+    def _fail(self) -> NoReturn:
+        """Raise the error of what has failed."""
+        found, stopped = self.state.failure, self.state.stop
+        self.state.stop = False
+        if found.phase == HOST or stopped:
+            for component in self.components:
+                if component.instance.polynomials is not None:
+                    component.instance.polynomials.status = 0
             error, self._raised = self._raised, None
-            return error
+            raise error or KeyboardInterrupt
         component, time = self.components[found.component], found.time
         instance, calls = component.instance, component.state.fmu
         when = f"at t = {time!r} s"
         if found.phase == NOT_FINITE:
-            outputs = component.outputs
-            check_finite(component.name, outputs, when)
+            check_finite(component.name, component.outputs, when)
         if found.status == RAISED:
-            return instance.raised()
+            raise instance.raised()
         if found.status == ENDED:
-            return instance.ended(f"at t = {calls.reached!r} s")
-        if found.phase == STEP:
+            raise instance.ended(f"at t = {calls.reached!r} s")
+        is_discrete = found.phase in (GET_DISCRETE, SET_DISCRETE)
+        if found.phase == STEP or is_discrete and self.state.inputs_first and found.item >= 0:
             when = f"in the step from t = {time!r} s"
         elif found.phase == SLOPES:
             when = f"for slopes {when}"
-        elif found.phase in (GET_DISCRETE, SET_DISCRETE):
+        elif is_discrete:
             when = self._of_discrete(component, found.phase, found.item)
-        name = function_names(instance)[calls.called]
-        return instance.failure(FMICallException(name, found.status), when)
+        failed = FMICallException(function_names(instance)[calls.called], found.status)
+        raise instance.failure(failed, when) from failed
 
     def _of_discrete(self, component: Component, phase: int, item: int) -> str:
         if item < 0:

@@ -84,10 +84,6 @@ class Fmi2Instance(Instance):
         fmi, arguments = self.fmi, (self.fmi.component, references, len(references), values)
         return partial(fmi.fmi2GetReal, *arguments), partial(fmi.fmi2SetReal, *arguments)
 
-    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
-        arguments = self.fmi.component, references, len(references), orders, values
-        return partial(self.fmi.fmi2GetRealOutputDerivatives, *arguments)
-
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         fmi, count = self.fmi, len(names)
         memory, numbers = doubles(count * (order + 1))
@@ -198,11 +194,6 @@ class Fmi3Instance(Instance):
         fmi, count = self.fmi, len(references)
         arguments = fmi.component, references, count, values, count
         return partial(fmi.fmi3GetFloat64, *arguments), partial(fmi.fmi3SetFloat64, *arguments)
-
-    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
-        count = len(references)
-        arguments = self.fmi.component, references, count, orders, values, count
-        return partial(self.fmi.fmi3GetOutputDerivatives, *arguments)
 
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         coefficients, inputs = np.zeros((order + 1, len(names))), self.reals(names)

@@ -1,4 +1,4 @@
-"""Runs segments of logs with the compiled loop, on all cores, and guesses their start states."""
+"""Runs segments of logs on all cores, and guesses their start states."""
 
 import os
 import threading
@@ -163,7 +163,7 @@ class _Runner:
         if segment.inputs.shape[1]:
             loop.values[loop.state.first_driven :] = segment.inputs[0]
         loop.set_inputs("in initialization")
-        loop.transfer(segment.switches[0].astype(np.int64))
+        loop.set_switches(segment.switches[0])
         instance.exit_initialization()
         loop.read()
 
@@ -171,7 +171,7 @@ class _Runner:
         loop = self._loop
         rows = np.empty((len(segment.times), loop.width))
         rows[0] = loop.values[: loop.width]
-        loop.run(segment.times[1:], segment.inputs[1:], segment.switches[1:], rows)
+        loop.run(segment.times[1:], segment.inputs[:-1], segment.switches[:-1], rows)
         return rows
 
 

@@ -27,8 +27,8 @@ enum {
     FMU_OK = 0,
     FMU_DISCARD = 2,
     FMU_ERROR = 3,
-    FMU_ENDED = 100,  /* the FMU asks to end the simulation; reached says when */
-    FMU_RAISED = 101, /* a function of the host has failed within the call */
+    FMU_ENDED = 1000000, /* the FMU asks to end the simulation; reached says when */
+    FMU_RAISED,          /* a function of the host has failed within the call */
 };
 
 /* Types of discrete variables. */
@@ -59,7 +59,7 @@ struct fmu {
     double *memory;                              /* [memory_count]; NULL: of an FMU */
     int64_t memory_count;
     int32_t version; /* of FMI: 2 or 3 */
-    int32_t called;  /* enum fmu_function, last */
+    int32_t called;  /* enum fmu_function, the last one */
 };
 
 struct fmu_variable {

@@ -1,13 +1,21 @@
+#define _DEFAULT_SOURCE /* gettimeofday */
 #include "loop.h"
 
 #include <math.h>
 #include <string.h>
+#include <sys/time.h>
 
 static const double rounding = 1e-9; /* of a step: two times closer than that are equal */
+
+static const double piece = 0.02; /* s, after which the host has its turn */
 
 /* Notes what has failed. Returns false if the status is one that stops a run. */
 static bool passes(struct loop *loop, int status, enum loop_phase phase,
                    const struct loop_component *c, int64_t item, double time) {
+    if (loop->stop) { /* then the status may be anything */
+        status = FMU_RAISED;
+        phase = LOOP_HOST;
+    }
     if (status < FMU_DISCARD) {
         return true;
     }
@@ -61,7 +69,7 @@ static int set_over_step(const struct loop *loop, struct loop_component *c, doub
         return status;
     }
     for (int64_t i = 0; i < 2 * n; i++) {
-        c->lines[i] = c->kept[i]; /* FMI 3.0: the host sets the inputs within the step */
+        c->lines[i] = c->kept[i]; /* FMI 3.0: loop_update_inputs sets them within the step */
     }
     return c->fmu.version == 2 ? fmu_set_slopes(&c->fmu, n, c->inputs, c->orders, slopes) : FMU_OK;
 }
@@ -145,40 +153,47 @@ int loop_follow_slopes(struct loop *loop) {
 
 /* ---- Discrete variables --------------------------------------------------------------------- */
 
-int64_t loop_transfer(struct loop *loop, const int64_t scheduled[]) {
-    struct loop_component *const *const all = loop->components;
+/* Finds the values that discrete inputs must have. */
+static bool find_wanted(struct loop *loop, const int64_t scheduled[]) {
     for (int64_t k = 0; k < loop->switch_count; k++) {
         struct loop_switch *const s = &loop->switches[k];
-        s->is_new = 0;
         if (s->source < 0) {
+            s->is_new = s->value != scheduled[s->column];
             s->value = scheduled[s->column];
             continue;
         }
-        const int status = fmu_get_discrete(&all[s->source]->fmu, s->from, &s->value);
-        if (!passes(loop, status, LOOP_GET_DISCRETE, all[s->source], k, loop->time)) {
-            return -1;
+        struct loop_component *const source = loop->components[s->source];
+        const int status = fmu_get_discrete(&source->fmu, s->from, &s->value);
+        if (!passes(loop, status, LOOP_GET_DISCRETE, source, k, loop->time)) {
+            return false;
         }
+    }
+    return true;
+}
+
+int64_t loop_transfer(struct loop *loop, const int64_t scheduled[]) {
+    if (!find_wanted(loop, scheduled)) {
+        return -1;
     }
     int64_t count = 0;
     for (int64_t k = 0; k < loop->switch_count; k++) {
         struct loop_switch *const s = &loop->switches[k];
-        struct loop_component *const target = all[s->target];
-        if (!target->is_due) {
-            continue;
-        }
-        int64_t present = 0;
-        int status = fmu_get_discrete(&target->fmu, s->to, &present);
-        if (!passes(loop, status, LOOP_GET_DISCRETE, target, k, loop->time)) {
-            return -1;
-        }
-        if (present != s->value) {
-            status = fmu_set_discrete(&target->fmu, s->to, s->value);
-            if (!passes(loop, status, LOOP_SET_DISCRETE, target, k, loop->time)) {
+        struct loop_component *const target = loop->components[s->target];
+        if (!loop->inputs_first) { /* else it has what was set last */
+            s->is_new = 0;
+            int64_t present = s->value;
+            const int status =
+                target->is_due ? fmu_get_discrete(&target->fmu, s->to, &present) : FMU_OK;
+            if (!passes(loop, status, LOOP_GET_DISCRETE, target, k, loop->time)) {
                 return -1;
             }
-            s->is_new = 1;
-            count++;
+            s->is_new = present != s->value;
         }
+        const int status = s->is_new ? fmu_set_discrete(&target->fmu, s->to, s->value) : FMU_OK;
+        if (!passes(loop, status, LOOP_SET_DISCRETE, target, k, loop->time)) {
+            return -1;
+        }
+        count += s->is_new;
     }
     return count;
 }
@@ -360,30 +375,52 @@ static bool read_next_row(struct loop *loop, double row[]) {
     return loop_read_row(loop, row) == 0;
 }
 
+static double wall_time(void) {
+    struct timeval now;
+    gettimeofday(&now, NULL);
+    return (double)now.tv_sec + 1e-6 * (double)now.tv_usec;
+}
+
+/* Makes step i of a run; row: where its row goes, NULL: none. */
+static bool make_step(struct loop *loop, const struct loop_run *run, int64_t i, double *row) {
+    const double *const driven = run->driven + i * loop->driven_count;
+    const int64_t *const scheduled = run->scheduled + i * loop->scheduled_count;
+    struct tangent *const tangent = loop->tangent;
+    const double begin = loop->time;
+    if (loop->inputs_first && !take_inputs(loop, driven, scheduled)) {
+        return false;
+    }
+    if (!step(loop, run->ends[i], row != NULL || !loop->reads_for_rows)) {
+        return false;
+    }
+    if (tangent != NULL) {
+        struct loop_component *const first = loop->components[0];
+        const double length = loop->time - begin;
+        const int status = tangent_end(tangent, &first->fmu, length, &run->growth[i]);
+        if (!passes(loop, status, LOOP_STEP, first, 0, begin)) {
+            return false;
+        }
+    }
+    if (!loop->inputs_first && !take_inputs(loop, driven, scheduled)) {
+        return false;
+    }
+    return row == NULL || read_next_row(loop, row);
+}
+
 int64_t loop_advance(struct loop *loop, const struct loop_run *run) {
     double *row = run->rows;
     loop->failure = (struct loop_failure){0};
-    struct tangent *const tangent = loop->tangent;
-    struct loop_component *const first = loop->components[0];
+    const double begin = wall_time();
     for (int64_t i = 0; i < run->count; i++) {
-        const double *const driven = run->driven + i * loop->driven_count;
-        const int64_t *const scheduled = run->scheduled + i * loop->scheduled_count;
         const bool has_row = row != NULL && (run->has_row == NULL || run->has_row[i]);
-        const bool has_early_row = has_row && loop->reads_rows_early;
-        const double begin = loop->time;
-        bool is_good = step(loop, run->ends[i], has_row || !loop->reads_for_rows);
-        if (is_good && tangent != NULL) {
-            const double length = loop->time - begin;
-            const int status = tangent_end(tangent, &first->fmu, length, &run->growth[i]);
-            is_good = passes(loop, status, LOOP_STEP, first, 0, begin);
-        }
-        is_good = is_good && (!has_early_row || read_next_row(loop, row));
-        is_good = is_good && take_inputs(loop, driven, scheduled);
-        is_good = is_good && (!has_row || has_early_row || read_next_row(loop, row));
-        if (!is_good) {
+        if (!make_step(loop, run, i, has_row ? row : NULL)) {
             return i;
         }
         row += has_row ? loop->row_width : 0;
+        const double elapsed = wall_time() - begin;
+        if (elapsed > piece || elapsed < 0.0) { /* the clock may have been set */
+            return i + 1;
+        }
     }
     return run->count;
 }

@@ -1,8 +1,8 @@
 /* The loop of a co-simulation: steps connected FMUs, in Jacobi or Gauss-Seidel order.
  *
  * The host, rparm/fmi/loop.py, fills these structures and owns all memory in them; nothing is
- * allocated here. It is called for what needs more than a few lines: algebraic loops, and what
- * follows when a Boolean or Integer has changed.
+ * allocated here. The host is called back for algebraic loops, and for what follows when a Boolean
+ * or Integer has changed.
  *
  * All times are in s. `values` are those of the whole system: outputs by component, then inputs
  * from outside. Each Real input has a source among them. */
@@ -20,15 +20,16 @@ struct loop_component {
     const uint32_t *inputs; /* value references */
     const int64_t *sources; /* indices of values */
     const uint8_t *ahead;   /* 1: the source's component steps before this one */
-    const uint8_t *on_loop; /* 1: on an algebraic loop, the host solves for it */
+    const uint8_t *on_loop; /* 1: on an algebraic loop that the host solves */
     const int32_t *orders;  /* all 1 */
     double *input_values;   /* as set last */
     double *kept;           /* [2][input_count] sources and their slopes as the step began */
     double *lines;          /* the same, for an FMU that takes slopes; NULL: it takes none */
     int32_t has_ahead;      /* some inputs are ahead */
     int32_t solves;         /* some are on an algebraic loop */
-    int32_t is_sampled;     /* without slopes, inputs count at the beginning, not in the middle */
-    int32_t is_due;         /* the last step of the loop has brought it to its end */
+    int32_t is_sampled; /* without slopes: it takes its inputs from the beginning of the step, not
+                           its middle */
+    int32_t is_due;     /* the last step of the loop has brought it to its end */
 
     /* Real outputs that are read after each step */
     int64_t output_count;
@@ -67,7 +68,7 @@ struct loop_switch {
     struct fmu_variable from;
     struct fmu_variable to;
     int64_t column; /* of the schedule */
-    int64_t value;  /* that it shall have */
+    int64_t value;  /* wanted, or set last */
     int64_t is_new; /* 1: set by the last transfer */
 };
 
@@ -117,32 +118,34 @@ struct loop {
 
     struct tangent *tangent; /* of the first component's states; NULL: none */
 
-    int32_t extrapolates;     /* inputs are straight lines over a step, not held */
-    int32_t has_rates;        /* components have their own steps */
-    int32_t is_final;         /* no step is ever undone */
-    int32_t checks_finite;    /* outputs */
-    int32_t sets_for_rows;    /* inputs of the next step are set before a row is read */
-    int32_t reads_for_rows;   /* outputs are read for rows only */
-    int32_t reads_rows_early; /* rows are read before inputs from outside have changed */
+    int32_t extrapolates;   /* inputs are straight lines over a step, not held */
+    int32_t has_rates;      /* components have their own steps */
+    int32_t is_final;       /* no step is ever undone */
+    int32_t checks_finite;  /* outputs */
+    int32_t sets_for_rows;  /* inputs of the next step are set before a row is read */
+    int32_t reads_for_rows; /* outputs are read for rows only */
+    int32_t inputs_first;   /* inputs from outside are taken before a step, and hold over it */
 
     double start;
     double time;
     double end;         /* of the present step */
     int64_t step_count; /* of components, so far */
+    int32_t stop;       /* not 0: the host ends the run, from within a call */
     struct loop_failure failure;
 };
 
 struct loop_run {
     int64_t count;            /* steps */
     const double *ends;       /* [count] s */
-    const double *driven;     /* [count][driven_count] at the ends */
-    const int64_t *scheduled; /* [count][scheduled_count] at the ends */
+    const double *driven;     /* [count][driven_count] at the ends; inputs_first: the beginnings */
+    const int64_t *scheduled; /* [count][scheduled_count] the same */
     const uint8_t *has_row;   /* [count] NULL: each step has a row */
     double *rows;             /* [rows][row_width]; NULL: none. The row before is there, too */
     double *growth;           /* [count] of the tangent */
 };
 
-/* Makes steps; returns how many were made before one failed, which `failure` explains. */
+/* Makes steps for 20 ms, or all; returns how many were made. If one failed, `failure` explains it.
+ */
 LOOP_API int64_t loop_advance(struct loop *loop, const struct loop_run *run);
 
 /* Sets the discrete inputs whose sources have another value; returns how many, -1 after a failure.
@@ -160,5 +163,5 @@ LOOP_API int loop_follow_slopes(struct loop *loop);
 /* In place of a function that an FMU lacks: returns FMI's status of an error. */
 LOOP_API int loop_missing(void);
 
-/* Returns the size of a structure, in the order of declaration here, for the host to compare. */
+/* Returns the size of a structure, in the order of the table there, for the host to compare. */
 LOOP_API int64_t loop_size(int number);

@@ -39,7 +39,7 @@ FUNCTIONS = {
     ),
 }  # fmt: skip
 TYPES = ("Boolean", "Integer", "Enumeration")  # enum fmu_type
-ENDED, RAISED = 100, 101
+ENDED, RAISED = 1_000_000, 1_000_001
 STEP, READ, ROW, SLOPES, GET_DISCRETE, SET_DISCRETE, NOT_FINITE, HOST = range(8)  # loop_phase
 Solve, Follow, Host = CFUNCTYPE(c_int, c_int64), CFUNCTYPE(c_int), CFUNCTYPE(c_int, c_double)
 
@@ -181,13 +181,14 @@ class LoopState(_Pointing):
             (name, c_int32)
             for name in (
                 "extrapolates", "has_rates", "is_final", "checks_finite", "sets_for_rows",
-                "reads_for_rows", "reads_rows_early",
+                "reads_for_rows", "inputs_first",
             )
         ),
         ("start", c_double),
         ("time", c_double),
         ("end", c_double),
         ("step_count", c_int64),
+        ("stop", c_int32),
         ("failure", Failure),
     ]  # fmt: skip
 
@@ -212,13 +213,16 @@ STRUCTURES = (
 def library() -> CDLL:
     """Load the loop; UserError if it is not there, or of another version than this file."""
     path = project.loop_library()
+    way_out = "install rparm again" if project.INSTALLED else "cmake --build build makes it"
+    if not path.is_file():
+        raise UserError(f"{path}: not there, {way_out}")
     try:
         found = CDLL(str(path))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be loaded: {one_line(error)}") from error
-    found.loop_size.restype = c_int64
+        found.loop_size.restype = c_int64
+    except (OSError, AttributeError) as error:
+        raise UserError(f"{path}: cannot be loaded, {way_out}: {one_line(error)}") from error
     if [found.loop_size(i) for i in range(len(STRUCTURES))] != [*map(sizeof, STRUCTURES)]:
-        raise UserError(f"{path}: not of this version of rparm, build it again")
+        raise UserError(f"{path}: not of this version of rparm, {way_out}")
     found.loop_advance.restype = found.loop_transfer.restype = c_int64
     found.loop_advance.argtypes = c_void_p, c_void_p
     found.loop_transfer.argtypes = found.loop_read_row.argtypes = c_void_p, c_void_p

@@ -110,6 +110,7 @@ class _Run:
         self._loop.start(float(scenario.times[0]))
         self._driven = self._columns(reals, np.float64)
         self._scheduled = self._columns(switches, np.int64)
+        self._loop.know_switches(self._scheduled[0])  # as initialization has left them
         self.rows = np.empty((len(scenario.reference_rows), count + len(drawn)))
 
     def _columns(self, names: list[str], kind: type) -> np.ndarray:
@@ -126,11 +127,10 @@ class _Run:
         has_row[self._scenario.reference_rows] = True
         made = 0  # rows
         try:
-            loop.values[loop.state.first_driven :] = self._driven[0]
             loop.read()
             loop.read_row(self.rows[0])
             made = 1
-            given = self._driven[1:], self._scheduled[1:]
+            given = self._driven[:-1], self._scheduled[:-1]
             loop.run(times[1:], *given, self.rows, has_row[1:], progress=progress)
         except UserError as error:
             self.rows = self.rows[: made + has_row[1 : 1 + loop.done].sum()]

@@ -146,6 +146,7 @@ class Master(AbstractContextManager["Master"]):
             instances = {}
             for name, fmu in fmus.items():
                 fed = [c.end_connector for c in real if c.end_component == name]
+                fed += [variable for component, variable in self._moved if component == name]
                 is_smooth = self.extrapolates and fmu.model.interpolates_inputs
                 instance = fmu.instance(name, fed if is_smooth else ())
                 instances[name] = self._stack.enter_context(instance)

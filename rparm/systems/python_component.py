@@ -436,9 +436,6 @@ class PythonInstance(Instance):
             self._names[x]: value for x, value in zip(places, values.tolist(), strict=True)
         }
 
-    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
-        return no_call  # its outputs have no derivatives, so masters do not ask
-
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         return InputPolynomials(np.zeros((order + 1, len(names))), no_call)  # nor sets any
 
@@ -553,7 +550,7 @@ class _Snapshot:
         pass
 
 
-# ---- Called from compiled code -------------------------------------------------------------------
+# ---- Called from C -------------------------------------------------------------------
 class _Calls:
     """Functions of C with the names of FMI 2.0, for the loop; inputs and outputs are in memory."""
 

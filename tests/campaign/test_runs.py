@@ -1,4 +1,4 @@
-"""Runs by the compiled loop: those of rparm's own simulation and master, to the last bit."""
+"""Runs of instances that are reset: those of simulations and of the master, to the last bit."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rparm.campaign import bases
+from rparm.campaign.instances import Alone
 from rparm.campaign.job import LYAPUNOV
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
@@ -53,6 +54,20 @@ def test_a_run_has_the_bits_of_a_simulation(name: str, tmp_path: Path) -> None:
         reference_every=1,
     )
     assert_bits_of_simulation(record, job.watched, changed)
+
+
+def test_what_cannot_be_reset_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with runner(campaign(tmp_path), tmp_path) as (runs, job, points):
+        expected = rows(runs, job, points, [0, 1, 2])
+
+    def refused(_: Alone) -> None:
+        raise UserError("no reset")
+
+    monkeypatch.setattr(Alone, "reset", refused)
+    with runner(campaign(tmp_path), tmp_path) as (runs, job, points):
+        found = rows(runs, job, points, [0, 1, 2])
+    assert found.failures == [""] * 3
+    assert found.measures.tobytes() == expected.measures.tobytes()
 
 
 SYSTEM = HEAD + (

@@ -19,6 +19,7 @@ from rparm.fmi.loop import Component, function_names
 PROTOTYPES = {
     "fmi2GetReal": (c_void_p, POINTER(c_uint), c_size_t, POINTER(c_double)),
     "fmi3GetFloat64": (c_void_p, POINTER(c_uint), c_size_t, POINTER(c_double), c_size_t),
+    "fmi2SetBoolean": (c_void_p, POINTER(c_uint), c_size_t, POINTER(c_int)),
     "fmi3DoStep": (c_void_p, c_double, c_double, c_bool, *[POINTER(c_bool)] * 3, POINTER(c_double)),
 }
 
