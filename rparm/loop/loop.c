@@ -1,4 +1,3 @@
-#define _DEFAULT_SOURCE /* gettimeofday */
 #include "loop.h"
 
 #include <math.h>

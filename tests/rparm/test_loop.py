@@ -36,7 +36,7 @@ def python(folder: Path, text: str) -> PythonComponent:
 
 
 def test_an_interrupt_ends_a_run_wherever_it_comes(tmp_path: Path) -> None:
-    """At the first instruction of a function that C calls, too, where ctypes would only print it."""
+    """At the first instruction of what C calls, too, where ctypes would only print it."""
     adder = python(tmp_path, ADDER)
     for delay in np.linspace(0.002, 0.02, 12):
         with Master({"p": adder, "q": adder}, PAIR) as master:
