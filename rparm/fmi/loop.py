@@ -1,4 +1,4 @@
-"""Runs of the loop in C: components and their wires, calls, and what went wrong.
+"""Runs of the loop in C: components and their connections, calls, errors.
 
 Values of a system are one array: outputs by component, then those that drive inputs from outside.
 FMUs are called by the addresses of their functions; Python components give such functions, too.
@@ -8,14 +8,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import (
-    addressof,
-    byref,
-    c_double,
-    c_void_p,
-    cast,
-    sizeof,
-)  # fmt: skip
+from ctypes import addressof, byref, c_double, c_void_p, cast, sizeof
 from typing import Any, NoReturn
 
 import numpy as np
@@ -43,7 +36,7 @@ from rparm.loop.structures import (
     Solve,
     Switch,
     TangentState,
-)  # fmt: skip
+)
 
 
 # ---- Components ----------------------------------------------------------------------------------
@@ -225,9 +218,9 @@ class Loop:
         self.record([])
 
     def switch(self, wires: Sequence[tuple[Any, int, str]], scheduled: int) -> None:
-        """Let discrete inputs follow: (source, target, variable), a source (component, variable).
+        """Connect discrete inputs: (source, component, variable).
 
-        Or a source is the number of a column of what is `scheduled`.
+        A source is an output (component, variable), or a column of what is `scheduled`.
         """
         switches = (Switch * len(wires))()
         for made, (source, target, variable) in zip(switches, wires, strict=True):
@@ -352,7 +345,7 @@ class Loop:
         scheduled : (n, scheduled), int64
             Discrete values from outside, the same.
         rows : (1 + rows, width)
-            Recorded behind the first, which is there.
+            Filled from the second on; the first has the values before the steps.
         has_row : (n,), bool
             Steps that end in a row; default: all.
         growth : (n,)

@@ -16,7 +16,7 @@ from ctypes import (
     c_uint32,
     c_void_p,
     sizeof,
-)  # fmt: skip
+)
 from typing import Any
 
 import numpy as np
@@ -204,9 +204,16 @@ class Run(_Pointing):
 
 
 STRUCTURES = (
-    Polynomials, FmuCalls, FmuVariable, TangentState, ComponentState, Switch, Failure, LoopState,
+    Polynomials,
+    FmuCalls,
+    FmuVariable,
+    TangentState,
+    ComponentState,
+    Switch,
+    Failure,
+    LoopState,
     Run,
-)  # fmt: skip
+)
 
 
 @functools.cache

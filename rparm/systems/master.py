@@ -21,6 +21,8 @@ components on them are at a communication point; in Gauss-Seidel order these ste
 
 A Boolean, Integer or Enumeration that has changed in a step is passed on at the end of the step, in
 both orders. Then all outputs are computed again at this time, as at the start.
+
+`rparm.fmi.loop` makes the steps, in C; initialization and algebraic loops are here.
 """
 
 import time
