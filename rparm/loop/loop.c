@@ -1,12 +1,20 @@
 #include "loop.h"
 
-#include <math.h>
-#include <string.h>
+#ifdef _WIN32
+#include <windows.h>
+#else
 #include <sys/time.h>
+#endif
 
 static const double rounding = 1e-9; /* of a step: two times closer than that are equal */
 
 static const double piece = 0.02; /* s, after which the host has its turn */
+
+static void copy(int64_t count, const double from[], double to[]) {
+    for (int64_t i = 0; i < count; i++) {
+        to[i] = from[i];
+    }
+}
 
 /* Notes what has failed. Returns false if the status is one that stops a run. */
 static bool passes(struct loop *loop, int status, enum loop_phase phase,
@@ -108,7 +116,7 @@ static bool read_outputs(struct loop *loop, struct loop_component *c, double tim
     const int status = fmu_get_reals(&c->fmu, c->output_count, c->outputs, outputs);
     bool is_good = passes(loop, status, LOOP_READ, c, 0, time);
     for (int64_t i = 0; is_good && loop->checks_finite && i < c->output_count; i++) {
-        if (!isfinite(outputs[i])) {
+        if (!__builtin_isfinite(outputs[i])) {
             is_good = passes(loop, FMU_DISCARD, LOOP_NOT_FINITE, c, i, time);
         }
     }
@@ -215,7 +223,8 @@ static void note_end(const struct loop *loop, struct loop_component *c, double e
     c->time = end;
     if (c->every != 0.0) {
         const double passed = (end - loop->start + (0.5 + rounding) * length) / c->every;
-        c->ticks = fmax(c->ticks, floor(passed));
+        const double whole = (double)(int64_t)passed; /* which is not below 0 */
+        c->ticks = whole > c->ticks ? whole : c->ticks;
     }
 }
 
@@ -257,7 +266,7 @@ static bool step_group(struct loop *loop, int64_t group, double end, double leng
     for (const int64_t *i = first; i < last; i++) {
         struct loop_component *const c = all[*i];
         if (loop->extrapolates && c->is_due && c->output_count > 0) {
-            memcpy(c->before, loop->values + c->first, (size_t)c->output_count * sizeof(double));
+            copy(c->output_count, loop->values + c->first, c->before);
         }
     }
     for (const int64_t *i = first; i < last; i++) {
@@ -369,16 +378,31 @@ int loop_read_row(struct loop *loop, double row[]) {
 /* Reads a row; row[-row_width] is the one before. */
 static bool read_next_row(struct loop *loop, double row[]) {
     if (loop->has_rates) { /* of components that are within a step */
-        memcpy(row, row - loop->row_width, (size_t)loop->row_width * sizeof *row);
+        copy(loop->row_width, row - loop->row_width, row);
     }
     return loop_read_row(loop, row) == 0;
 }
 
+#ifdef _WIN32
+/* The library has no C runtime: 70 of 84 kB would be that. */
+BOOL WINAPI DllMainCRTStartup(HINSTANCE library, DWORD reason, LPVOID reserved);
+
+BOOL WINAPI DllMainCRTStartup(HINSTANCE library, DWORD reason, LPVOID reserved) {
+    return TRUE;
+}
+
+static double wall_time(void) {
+    FILETIME now;
+    GetSystemTimeAsFileTime(&now);
+    return 1e-7 * (4294967296.0 * (double)now.dwHighDateTime + (double)now.dwLowDateTime);
+}
+#else
 static double wall_time(void) {
     struct timeval now;
     gettimeofday(&now, NULL);
     return (double)now.tv_sec + 1e-6 * (double)now.tv_usec;
 }
+#endif
 
 /* Makes step i of a run; row: where its row goes, NULL: none. */
 static bool make_step(struct loop *loop, const struct loop_run *run, int64_t i, double *row) {

@@ -1,7 +1,6 @@
 #include "tangent.h"
 
 #include <math.h>
-#include <string.h>
 
 static int rate(const struct tangent *tangent, struct fmu *fmu, const double deviation[],
                 double result[]) {
@@ -14,8 +13,8 @@ static int changes(struct tangent *tangent, struct fmu *fmu, bool *has_changed) 
     *has_changed = false;
     double *const now = tangent->real_values;
     double *const before = now + tangent->real_count;
-    if (tangent->real_count > 0) {
-        memcpy(before, now, (size_t)tangent->real_count * sizeof *now);
+    for (int64_t k = 0; k < tangent->real_count; k++) {
+        before[k] = now[k];
     }
     int status = fmu_get_reals(fmu, tangent->real_count, tangent->reals, now);
     for (int64_t k = 0; status < FMU_DISCARD && k < tangent->real_count; k++) {
@@ -37,7 +36,7 @@ static double normalize(int64_t count, double x[]) {
     for (int64_t k = 0; k < count; k++) {
         total += x[k] * x[k];
     }
-    const double length = sqrt(total);
+    const double length = __builtin_sqrt(total);
     for (int64_t k = 0; k < count; k++) {
         x[k] /= length;
     }

@@ -3,8 +3,8 @@
  * the terms of a Taylor series. There is no function of CVODE to write it. */
 #include "cvode_start.h"
 
-#include "guess.h"
 #include "small_vector.h"
+#include "taylor_series.h"
 
 #include <cvode/cvode_impl.h>
 #include <math.h>
@@ -51,7 +51,8 @@ double cvode_start(void *solver, struct problem *problem, const double x[],
     const double error = error_constant / first_error * norm_of(problem, row, ORDER + 1);
     const double longest = fmin(most_times / sqrt(bent), pow(error, -1.0 / (ORDER + 1)));
     const double max_step = problem->settings.max_step;
-    const double past_event = guess_passed * guess_next_event(problem, row, 0.0);
+    const double past_event =
+        taylor_series_guess_passed * taylor_series_guess_event(problem, row, 0.0);
     double h = fmin(fmin(longest, past_event) * time_scale, problem->horizon * (1.0 - 0x1p-40));
     h = max_step > 0.0 ? fmin(h, max_step) : h;
     if (!(h > 0.0 && isfinite(h) && isfinite(bent) && isfinite(error))) {

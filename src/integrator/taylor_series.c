@@ -1,6 +1,5 @@
 #include "taylor_series.h"
 
-#include "guess.h"
 #include "workspace.h"
 
 #include <float.h>
@@ -154,6 +153,28 @@ static enum status find_order(struct taylor_series *series) {
     }
 }
 
+double taylor_series_guess_event(const struct problem *problem, double row[][SERIES_LENGTH],
+                                 double nearest) {
+    const struct location *location = &problem->location;
+    const struct series *rows = problem->ode.rows;
+    double soonest = INFINITY;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
+        const struct indicator *indicator = &location->indicators[i];
+        const bool is_of_state = indicator->kind == INDICATOR_OF_STATE;
+        if (!is_of_state && (rows == NULL || rows->row_of_indicator == NULL)) {
+            continue;
+        }
+        const double factor = is_of_state ? indicator->factor : 1.0;
+        const double *c = row[is_of_state ? indicator->state : rows->row_of_indicator[i]];
+        if (location->is_armed[i] || factor * c[1] > 0.0) {
+            const double s = roots_guess(is_of_state ? indicator->offset : 0.0, factor, c);
+            soonest = s > nearest && s < soonest ? s : soonest;
+        }
+    }
+    return soonest;
+}
+
 /* ---- Next event ----------------------------------------------------------------------------- */
 
 /* Nearest and farthest guess, in time scales: what is nearer may be rounding. */
@@ -166,11 +187,11 @@ enum { LEAST_GUESSED_ORDER = 3 };
 /* Makes the step end soon after the next event, if there is a guess of it, with the fewest orders
  * that suffice there. */
 static enum status lead_past_guess(struct taylor_series *series, double longest) {
-    const double guess = guess_next_event(series->problem, series->row, nearest_guess);
+    const double guess = taylor_series_guess_event(series->problem, series->row, nearest_guess);
     if (!(guess < farthest_guess)) {
         return STATUS_OK;
     }
-    const double step = fmin(guess_passed * guess, longest);
+    const double step = fmin(taylor_series_guess_passed * guess, longest);
     double power = step * step;
     double before = power * size_of(series, 2, INFINITY);
     for (int order = LEAST_GUESSED_ORDER; order <= series->largest_order / 2; order++) {

@@ -133,3 +133,11 @@ MUST_CHECK NONNULL bool taylor_series_vanishes(const struct taylor_series *serie
  * points at equal distances say: what lasts longer than such a distance is seen. */
 MUST_CHECK NONNULL double taylor_series_part_that_fits(struct taylor_series *series, double s,
                                                        int points);
+
+/* Returns about when the next indicator falls, in time scales of the rows of a series, by their
+ * first three orders; INFINITY if none seems to fall. Guesses are above `nearest`. */
+MUST_CHECK NONNULL double taylor_series_guess_event(const struct problem *problem,
+                                                    double row[][SERIES_LENGTH], double nearest);
+
+/* Length of a step that leads past a guess, over the guess. */
+static const double taylor_series_guess_passed = 1.125;

@@ -66,7 +66,7 @@ STANDARD = (
 LIBRARIES = {
     "the C standard library": (STANDARD, r".*"),
     "POSIX": (r"sched\.h", r"src/model"),  # platform.h: another thread may run
-    "POSIX, the clock": (r"sys/time\.h", r"rparm/loop"),
+    "the clock": (r"sys/time\.h|windows\.h", r"rparm/loop"),
     "x86-64": (r"cpuid\.h", r"src/model"),  # platform.h: the processor has AVX2
     "SUNDIALS": (r"(arkode|cvode|nvector|sun\w+)/\w+\.h", r"src/integrator"),
     "FMI 2.0": (r"fmi2\w+\.h", r"fmu/fmi2|rparm/loop"),
