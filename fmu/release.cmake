@@ -136,10 +136,11 @@ function(add_release)
   foreach(platform IN LISTS RELEASE_PLATFORMS)
     suffix_of(${platform} suffix)
     set(loop ${RELEASE_FOLDER}/loop/${platform}/loop${suffix})
+    set(built_loop ${PROJECT_BINARY_DIR}/platforms/${platform}/loop/loop${suffix})
     add_custom_command(
       OUTPUT ${loop}
-      COMMAND ${CMAKE_COMMAND} -E copy ${PROJECT_BINARY_DIR}/platforms/${platform}/loop/loop${suffix} ${loop}
-      DEPENDS ${platform_targets}
+      COMMAND ${CMAKE_COMMAND} -E copy ${built_loop} ${loop}
+      DEPENDS ${platform_targets} ${built_loop}
       VERBATIM)
     list(APPEND loops ${loop})
   endforeach()

@@ -15,6 +15,7 @@ from solvers import Solvers
 
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.loop import Loop, one_component
+from rparm.project import child_environment
 from rparm.runs import simulation
 from rparm.systems.connected_instance import begin_instance
 from rparm.systems.master import Master, master_of
@@ -129,7 +130,7 @@ def simulate_times(solvers: Solvers, arm: Path) -> tuple[float, float]:
 def first_time(path: Path) -> float:
     """Return s of a new process that runs a system."""
     begin = time.perf_counter()
-    subprocess.run([sys.executable, "-c", FIRST, path], check=True)
+    subprocess.run([sys.executable, "-c", FIRST, path], check=True, env=child_environment())
     return time.perf_counter() - begin
 
 
