@@ -26,6 +26,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from pieces import write_pieces  # noqa: E402
 
 SHARE = "rparm/share"
+# bytes of text have no positions in words
+TEXT = {"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "pb": 0}
 OF_MODELS = (".csv", ".h", ".json", ".py", ".svg", ".toml")
 OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/**/*.in", "fmu/*.css", "fmu/*.html")
 OF_FMU += ("src/instance/*.toml",)
@@ -53,7 +55,7 @@ class CustomBuildHook(BuildHookInterface):
             if file.suffix == ".csv":
                 packed = staging / f"{file.relative_to(root).as_posix()}.xz"
                 packed.parent.mkdir(parents=True, exist_ok=True)
-                packed.write_bytes(lzma.compress(file.read_bytes(), preset=9))
+                packed.write_bytes(_packed(file.read_bytes()))
             else:
                 include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
         for file in sorted(file for pattern in OF_FMU for file in root.glob(pattern)):
@@ -72,6 +74,10 @@ class CustomBuildHook(BuildHookInterface):
         """Remove what was only made for the wheel."""
         if self.target_name == "wheel":
             shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _packed(text: bytes) -> bytes:
+    return lzma.compress(text, filters=[TEXT])
 
 
 def _is_used(file: Path) -> bool:
@@ -103,6 +109,6 @@ def _add_plotly(root: Path, staging: Path) -> None:
     folder = staging / "plotly"
     folder.mkdir()
     script = (package / "package_data" / "plotly.min.js").read_bytes()
-    (folder / "plotly.min.js.xz").write_bytes(lzma.compress(script, preset=9))
+    (folder / "plotly.min.js.xz").write_bytes(_packed(script))
     (license_file,) = sorted(package.parent.glob("plotly-*.dist-info/**/LICENSE.txt"))
     shutil.copy(license_file, folder)

@@ -153,8 +153,8 @@ static enum status find_order(struct taylor_series *series) {
     }
 }
 
-double taylor_series_guess_event(const struct problem *problem, double row[][SERIES_LENGTH],
-                                 double nearest) {
+NOINLINE double taylor_series_guess_event(const struct problem *problem,
+                                          double row[][SERIES_LENGTH], double nearest) {
     const struct location *location = &problem->location;
     const struct series *rows = problem->ode.rows;
     double soonest = INFINITY;
