@@ -327,12 +327,9 @@ def platform_name() -> str:
     return f"{machine}-{platform.system().lower()}"
 
 
-def loop_library() -> Path:
-    """Return the library that steps FMUs, for this machine (rparm/loop)."""
-    suffix = {"windows": ".dll", "darwin": ".dylib"}.get(platform_name().split("-")[1], ".so")
-    if INSTALLED:
-        return ROOT / "loop" / platform_name() / f"loop{suffix}"
-    return PACKAGE.parent / "build" / "loop" / f"loop{suffix}"
+def loop_folder() -> Path:
+    """Return the folder of the library that steps FMUs, for this machine (rparm/loop)."""
+    return ROOT / "loop" / platform_name() if INSTALLED else PACKAGE.parent / "build" / "loop"
 
 
 def built_for_all() -> Path:

@@ -66,7 +66,6 @@ class Alone(Instances):
         self._instance = self._stack.enter_context(instance)
         switches = job.switches.names
         self.loop = one_component(self._instance, job.reals.names, switches, job.watched)
-        self._scheduled = job.switches.values.astype(np.int64)
         self._tangent = None
         if job.tangent is not None:
             self._tangent = Tangent(*job.tangent)
@@ -79,7 +78,7 @@ class Alone(Instances):
         self._initialize(point)
         times, loop = self._job.times, self.loop
         record[0] = loop.values[: loop.width]
-        given = self._held[:-1], self._scheduled[:-1], record
+        given = self._held[:-1], self._job.switches.values[:-1], record
         loop.run(times[1:], *given, growth=growth if self._tangent is not None else None)
         return self._integers([self._instance])
 
@@ -93,11 +92,7 @@ class Alone(Instances):
             instance.set(target.variable, value)
         instance.enter_initialization()
         loop.start(job.start)
-        loop.values[loop.state.first_driven :] = self._held[0]
-        loop.set_inputs("in initialization")
-        loop.set_switches(self._scheduled[0])
-        instance.exit_initialization()
-        loop.read()
+        loop.leave_initialization(self._held[0], self._job.switches.values[0])
         if self._tangent is not None:
             self._tangent.start()
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rparm.fmi.loop import side_by_side
 from rparm.fmi.model import Value
 from rparm.systems.python_component import PythonComponent
 from rparm.systems.structure import Connection
@@ -145,9 +146,7 @@ class HeldInputs:
     @staticmethod
     def of(inputs: Mapping[str, np.ndarray], count: int, kind: type) -> "HeldInputs":
         """Return inputs by name, (count,) each."""
-        columns = [values.astype(kind) for values in inputs.values()]
-        rows = np.column_stack(columns) if columns else np.zeros((count, 0), kind)
-        return HeldInputs(tuple(inputs), np.ascontiguousarray(rows))
+        return HeldInputs(tuple(inputs), side_by_side(inputs.values(), count, kind))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ FMUs are called by the addresses of their functions; Python components give such
 
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import addressof, byref, c_double, c_void_p, cast, sizeof
 from typing import Any, NoReturn
@@ -151,6 +151,12 @@ def one_component(
     return loop
 
 
+def side_by_side(columns: Iterable[np.ndarray], count: int, kind: type) -> np.ndarray:
+    """Return what comes from outside, (count, columns), of columns (count,) each."""
+    found = [column.astype(kind) for column in columns]
+    return np.column_stack(found) if found else np.empty((count, 0), kind)
+
+
 class Tangent:
     """A small deviation of the states of a component, carried along: tangent.h.
 
@@ -277,6 +283,15 @@ class Loop:
         for component in self.components:
             component.state.time, component.state.ticks, component.state.is_due = time, 0.0, True
 
+    def leave_initialization(self, driven: np.ndarray, scheduled: np.ndarray) -> None:
+        """Set all inputs, come to the first communication point, and read all outputs there."""
+        self.values[self.state.first_driven :] = driven
+        self.set_inputs("in initialization")
+        self.set_switches(scheduled)
+        for component in self.components:
+            component.instance.exit_initialization()
+        self.read()
+
     def read(self) -> None:
         """Read all outputs into the values."""
         for component in self.components:
@@ -309,11 +324,6 @@ class Loop:
         """Set the discrete inputs whose sources have another value, and return their names."""
         if self._library.loop_transfer(byref(self.state), scheduled.ctypes.data) < 0:
             self._fail()
-        return self.switched
-
-    @property
-    def switched(self) -> list[str]:
-        """Names of the inputs that the last transfer has set."""
         return [
             f"{self.components[target].name}.{variable}"
             for (_, target, variable), made in zip(self._wires, self._switches, strict=True)

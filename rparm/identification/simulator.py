@@ -160,12 +160,7 @@ class _Runner:
         instance.enter_initialization()
         loop = self._loop
         loop.start(float(segment.times[0]))
-        if segment.inputs.shape[1]:
-            loop.values[loop.state.first_driven :] = segment.inputs[0]
-        loop.set_inputs("in initialization")
-        loop.set_switches(segment.switches[0])
-        instance.exit_initialization()
-        loop.read()
+        loop.leave_initialization(segment.inputs[0], segment.switches[0])
 
     def _advance(self, segment: Segment) -> np.ndarray:
         loop = self._loop

@@ -331,7 +331,7 @@ def law(
     whole = np.array(columns).reshape(len(point), len(after)).T
     resting = np.zeros((len(after), len(made.outputs)))  # no output of before matters
     partials = np.hstack([whole[:, : len(x)], resting, whole[:, len(x) :]])
-    outputs = instance.numbers[len(made.inputs) :]
+    outputs = instance.memory[len(made.inputs) :]
     moved = inputs + np.array(sizes[len(x) :]) / 4
     is_uneven = _is_uneven(instance, time, step, inputs, moved)
     instance.restore(kept)

@@ -88,7 +88,7 @@ class SystemSubject(ExitStack):
             for name, component in whole.components.items():
                 instance = component.instance
                 if isinstance(instance, PythonInstance):
-                    self._laws[name] = instance, instance.numbers[: len(instance.made.inputs)]
+                    self._laws[name] = instance, instance.memory[: len(instance.made.inputs)]
                     found[name] = self.law(name, self.ssp.system.step)
                     continue
                 given = parameters.get(name, {})

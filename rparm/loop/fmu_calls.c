@@ -56,14 +56,13 @@ int fmu_get_reals(struct fmu *fmu, int64_t count, const uint32_t references[], d
 
 /* ---- Discrete variables --------------------------------------------------------------------- */
 
+/* FMI 2.0: Booleans and Integers are int, and their functions have the same type. */
+
 static int set_discrete_2(struct fmu *fmu, struct fmu_variable variable, int64_t value) {
-    if (variable.type == FMU_BOOLEAN) {
-        const fmi2Boolean given = value != 0;
-        fmi2SetBooleanTYPE *const set = FUNCTION(fmu, FMU_SET_BOOLEAN, fmi2SetBooleanTYPE);
-        return (int)set(fmu->instance, &variable.reference, 1, &given);
-    }
-    const fmi2Integer given = (fmi2Integer)value;
-    fmi2SetIntegerTYPE *const set = FUNCTION(fmu, FMU_SET_INTEGER, fmi2SetIntegerTYPE);
+    const bool is_boolean = variable.type == FMU_BOOLEAN;
+    const int given = is_boolean ? value != 0 : (int)value;
+    fmi2SetIntegerTYPE *const set =
+        FUNCTION(fmu, is_boolean ? FMU_SET_BOOLEAN : FMU_SET_INTEGER, fmi2SetIntegerTYPE);
     return (int)set(fmu->instance, &variable.reference, 1, &given);
 }
 
@@ -88,15 +87,11 @@ int fmu_set_discrete(struct fmu *fmu, struct fmu_variable variable, int64_t valu
 }
 
 static int get_discrete_2(struct fmu *fmu, struct fmu_variable variable, int64_t *value) {
-    int found = 0; /* fmi2Boolean and fmi2Integer are int */
-    int status;
-    if (variable.type == FMU_BOOLEAN) {
-        fmi2GetBooleanTYPE *const get = FUNCTION(fmu, FMU_GET_BOOLEAN, fmi2GetBooleanTYPE);
-        status = (int)get(fmu->instance, &variable.reference, 1, &found);
-    } else {
-        fmi2GetIntegerTYPE *const get = FUNCTION(fmu, FMU_GET_INTEGER, fmi2GetIntegerTYPE);
-        status = (int)get(fmu->instance, &variable.reference, 1, &found);
-    }
+    const bool is_boolean = variable.type == FMU_BOOLEAN;
+    int found = 0;
+    fmi2GetIntegerTYPE *const get =
+        FUNCTION(fmu, is_boolean ? FMU_GET_BOOLEAN : FMU_GET_INTEGER, fmi2GetIntegerTYPE);
+    const int status = (int)get(fmu->instance, &variable.reference, 1, &found);
     *value = found;
     return status;
 }

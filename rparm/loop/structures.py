@@ -19,6 +19,7 @@ from ctypes import (
 )
 from typing import Any
 
+import fmpy
 import numpy as np
 
 from rparm import project
@@ -219,7 +220,7 @@ STRUCTURES = (
 @functools.cache
 def library() -> CDLL:
     """Load the loop; UserError if it is not there, or of another version than this file."""
-    path = project.loop_library()
+    path = project.loop_folder() / f"loop{fmpy.sharedLibraryExtension}"
     way_out = "install rparm again" if project.INSTALLED else "cmake --build build makes it"
     if not path.is_file():
         raise UserError(f"{path}: not there, {way_out}")

@@ -13,7 +13,7 @@ from rparm.errors import StoppedError, UserError, WrongValueError, placed
 from rparm.files import difference
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.loop import one_component
+from rparm.fmi.loop import one_component, side_by_side
 from rparm.fmi.model import ARE_EXACT, INITIAL, INPUTS, PARAMETERS, Experiment, Model, Value
 from rparm.runs.scenario import USUAL_STEPS, Scenario, count_steps
 
@@ -108,17 +108,15 @@ class _Run:
         component.read_for_rows({name: count + i for i, name in enumerate(drawn)})
         self._loop.record(range(count), len(drawn))
         self._loop.start(float(scenario.times[0]))
-        self._driven = self._columns(reals, np.float64)
-        self._scheduled = self._columns(switches, np.int64)
+        self._driven = self._held(reals, np.float64)
+        self._scheduled = self._held(switches, np.int64)
         self._loop.know_switches(self._scheduled[0])  # as initialization has left them
         self.rows = np.empty((len(scenario.reference_rows), count + len(drawn)))
 
-    def _columns(self, names: list[str], kind: type) -> np.ndarray:
+    def _held(self, names: list[str], kind: type) -> np.ndarray:
         """Return inputs at all communication points, (n + 1, names)."""
-        columns = np.empty((len(self._scenario.times), len(names)), kind)
-        for column, name in zip(columns.T, names, strict=True):
-            column[:] = self._scenario.inputs[name]
-        return columns
+        inputs, count = self._scenario.inputs, len(self._scenario.times)
+        return side_by_side((inputs[name] for name in names), count, kind)
 
     def make(self, progress: Callable[[int], object] | None) -> UserError | None:
         """Make all steps, or those before one that fails; its error."""

@@ -34,7 +34,7 @@ import numpy as np
 from rparm.errors import UserError
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.loop import Loop, check_finite
+from rparm.fmi.loop import Loop, check_finite, side_by_side
 from rparm.fmi.model import Model, Value
 from rparm.runs.inputs import Signal
 from rparm.systems.algebraic_loop import AlgebraicLoop
@@ -297,8 +297,7 @@ class Master(AbstractContextManager["Master"]):
 
     def _sampled(self, signals: Collection[Signal], times: np.ndarray, kind: type) -> np.ndarray:
         elapsed = times - self.loop.state.start
-        columns = [signal.values(elapsed).astype(kind) for signal in signals]
-        return np.column_stack(columns) if columns else np.empty((len(times), 0), kind)
+        return side_by_side((signal.values(elapsed) for signal in signals), len(times), kind)
 
     def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
@@ -516,14 +515,11 @@ def run_in_master(
     rows = np.empty((len(times), len(names)))
     with ssp.unpacked_fmus() as fmus, master_of(ssp, fmus) as master:
         master.initialize(system.start, float(times[-1]), system.parameter_sets[variant])
-        for component in master.components.values():
-            own = {
-                variable: column
-                for column, name in enumerate(names)
-                for owner, variable in [ssp.split(name)]
-                if owner == component.name
-            }
-            component.read_for_rows(own)
+        own: dict[str, dict[str, int]] = {name: {} for name in master.components}
+        for column, (owner, variable) in enumerate(map(ssp.split, names)):
+            own[owner][variable] = column
+        for name, columns in own.items():
+            master.components[name].read_for_rows(columns)
         loop = master.loop
         loop.record([], len(names))
         loop.state.sets_for_rows = WAYS[system.order] == WAYS["jacobi"]

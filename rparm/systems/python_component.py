@@ -339,10 +339,9 @@ class PythonInstance(Instance):
         self._exchanged = [*made.inputs, *made.outputs]
         self._names = list(self.fmu.model.variables)
         self._given = {*made.outputs, *made.switched_outputs}  # by a step
-        if self.memory is None:  # it stays where it is
+        if self.memory is None:  # inputs, then outputs; it stays where it is
             self.memory = np.zeros(len(self._exchanged))
-        self.numbers = self.memory  # inputs, then outputs
-        self.numbers[:] = 0.0
+        self.memory[:] = 0.0
         # Booleans and Integers
         self.switches = {name: 0 for name in (*made.switched_inputs, *made.switched_outputs)}
 
@@ -376,7 +375,7 @@ class PythonInstance(Instance):
         for name in given:
             self._check_output(name, "start")
         for i, name in enumerate(self.made.outputs, self._count):
-            self.numbers[i] = self._number(name, given.get(name, 0.0), "start")
+            self.memory[i] = self._number(name, given.get(name, 0.0), "start")
         for name in self.made.switched_outputs:
             self.switches[name] = self._switch(name, given.get(name, 0), "start")
 
@@ -387,7 +386,7 @@ class PythonInstance(Instance):
 
     def set(self, name: str, value: Value) -> None:
         if name in self._exchanged:
-            self.numbers[self._exchanged.index(name)] = value
+            self.memory[self._exchanged.index(name)] = value
             return
         if name in self.switches:
             self.switches[name] = int(value)
@@ -420,13 +419,13 @@ class PythonInstance(Instance):
         own = len(self._exchanged)
         for i, place in enumerate(places):
             if place < own:
-                numbers[i] = self.numbers[place]
+                numbers[i] = self.memory[place]
             else:
                 name = self._names[place]
                 numbers[i] = self._number(name, getattr(self.made.object, name), "attribute")
 
     def put_reals(self, places: Sequence[int], numbers: np.ndarray) -> None:
-        self.numbers[places] = numbers
+        self.memory[places] = numbers
 
     def get_switches(self, places: Sequence[int], values: np.ndarray) -> None:
         values[:] = [self.discrete(self._names[place]) for place in places]
@@ -442,17 +441,20 @@ class PythonInstance(Instance):
     # ---- Steps -----------------------------------------------------------------------------------
 
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
-        result = self._called(start, length, self.numbers[: self._count])
+        result, when = self._called(start, length, self.memory[: self._count])
         for name in self.made.switched_outputs:
-            self.switches[name] = self._switch(name, result[name], _when(start))
-        self.numbers[self._count :] = self._reals(result, start)
+            self.switches[name] = self._switch(name, result[name], when)
+        self.memory[self._count :] = self._reals(result, when)
 
     def stepped(self, start: float, length: float, inputs: np.ndarray) -> list[float]:
         """Call the user's step with Real inputs; return its Real outputs, in their order."""
-        return self._reals(self._called(start, length, inputs), start)
+        return self._reals(*self._called(start, length, inputs))
 
-    def _called(self, start: float, length: float, inputs: np.ndarray) -> Mapping[str, Any]:
-        """Return what the user's step gives: all outputs, and nothing else."""
+    def _called(
+        self, start: float, length: float, inputs: np.ndarray
+    ) -> tuple[Mapping[str, Any], str]:
+        """Return what the user's step gives, all outputs and nothing else, and when."""
+        when = f"in the step from t = {start!r} s"
         given = _Inputs(zip(self.made.inputs, inputs.tolist(), strict=True))
         for name in self.made.switched_inputs:
             given[name] = self.made.kinds[name](self.switches[name])
@@ -461,10 +463,9 @@ class PythonInstance(Instance):
         except UserError:
             raise
         except (Exception, SystemExit) as error:
-            raise self.fmu.failure(error, _when(start), self.name) from error
+            raise self.fmu.failure(error, when, self.name) from error
         if type(result) is dict and result.keys() == self._given:
-            return result
-        when = _when(start)
+            return result, when
         if not isinstance(result, Mapping):
             raise self._wrong(f"step: expected a dict of outputs, got {show(result)} {when}")
         for name in result:
@@ -473,14 +474,10 @@ class PythonInstance(Instance):
         missing = [name for name in outputs if name not in result]
         if missing:
             raise self._wrong(f"step: returned no {missing[0]!r} {when}")
-        return result
+        return result, when
 
-    def _reals(self, result: Mapping[str, Any], start: float) -> list[float]:
-        found = [result[name] for name in self.made.outputs]
-        if all(type(value) is float and math.isfinite(value) for value in found):
-            return found
-        when = _when(start)
-        return [self._number(x, y, when) for x, y in zip(self.made.outputs, found, strict=True)]
+    def _reals(self, result: Mapping[str, Any], when: str) -> list[float]:
+        return [self._number(name, result[name], when) for name in self.made.outputs]
 
     def snapshot(self) -> Snapshot:
         return cast(Snapshot, _Snapshot(self))
@@ -527,10 +524,6 @@ class PythonInstance(Instance):
         return int(number)
 
 
-def _when(start: float) -> str:
-    return f"in the step from t = {start!r} s"
-
-
 class _Snapshot:
     """A snapshot of an instance in Python, which does what one of an FMU does."""
 
@@ -539,10 +532,10 @@ class _Snapshot:
 
     def take(self) -> None:
         of = self._instance
-        self._kept = of.save(), of.numbers.copy(), dict(of.switches)
+        self._kept = of.save(), of.memory.copy(), dict(of.switches)
 
     def restore(self) -> None:
-        state, self._instance.numbers[:], switches = self._kept
+        state, self._instance.memory[:], switches = self._kept
         self._instance.switches |= switches
         self._instance.restore(state)
 
@@ -550,7 +543,7 @@ class _Snapshot:
         pass
 
 
-# ---- Called from C -------------------------------------------------------------------
+# ---- Called from C -------------------------------------------------------------------------------
 class _Calls:
     """Functions of C with the names of FMI 2.0, for the loop; inputs and outputs are in memory."""
 
@@ -561,7 +554,6 @@ class _Calls:
         values = CFUNCTYPE(c_int, c_void_p, c_void_p, c_size_t, c_void_p)
         step = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
         self.fmi2GetReal = values(self._moved(instance.get_reals))
-        self.fmi2SetReal = values(self._moved(instance.put_reals))
         self.fmi2GetBoolean = values(self._moved(instance.get_switches, c_int))
         self.fmi2SetBoolean = values(self._moved(instance.put_switches, c_int))
         self.fmi2GetInteger, self.fmi2SetInteger = self.fmi2GetBoolean, self.fmi2SetBoolean

@@ -153,6 +153,8 @@ static enum status find_order(struct taylor_series *series) {
     }
 }
 
+/* ---- Next event ----------------------------------------------------------------------------- */
+
 NOINLINE double taylor_series_guess_event(const struct problem *problem,
                                           double row[][SERIES_LENGTH], double nearest) {
     const struct location *location = &problem->location;
@@ -174,8 +176,6 @@ NOINLINE double taylor_series_guess_event(const struct problem *problem,
     }
     return soonest;
 }
-
-/* ---- Next event ----------------------------------------------------------------------------- */
 
 /* Nearest and farthest guess, in time scales: what is nearer may be rounding. */
 static const double nearest_guess = 0x1p-10;

@@ -14,7 +14,7 @@ from by_heyoka import START, STATES, Work
 from solvers import Solvers
 
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.loop import Loop, one_component
+from rparm.fmi.loop import one_component
 from rparm.project import child_environment
 from rparm.runs import simulation
 from rparm.systems.connected_instance import begin_instance
@@ -56,23 +56,22 @@ def seconds(call: Callable[[], object]) -> float:
     return time.process_time() - begin
 
 
-def alone(
-    system: System, master: Master, name: str, fmu: Fmu, rows: np.ndarray
-) -> tuple[Loop, Callable[[], object]]:
-    """Return a loop of one component that gets the inputs of a run, and what makes its steps."""
+def seconds_alone(
+    system: System, variant: str, master: Master, name: str, fmu: Fmu, rows: np.ndarray
+) -> float:
+    """Return s of all steps of one component that gets the inputs of a run."""
     index = {key: i for i, key in enumerate(master.names)}
     fed = {c.end_connector: index[c.start] for c in system.connections
            if c.end_component == name and c.start in index}  # fmt: skip
-    instance = fmu.instance(name).__enter__()
-    parameters = system.parameter_sets[VARIANT].get(name, {})
-    begin_instance(instance, system.start, float(system.times[-1]), parameters)
-    instance.exit_initialization()
-    loop = one_component(instance, list(fed), [], fmu.model.real_outputs)
-    loop.start(system.start)
-    driven = np.ascontiguousarray(rows[:, list(fed.values())])
-    loop.values[loop.state.first_driven :] = driven[0]
-    found = np.empty((len(rows), loop.width))
-    return loop, lambda: loop.run(system.times[1:], driven[1:], rows=found)
+    with fmu.instance(name) as instance:
+        parameters = system.parameter_sets[variant].get(name, {})
+        begin_instance(instance, system.start, float(system.times[-1]), parameters)
+        instance.exit_initialization()
+        loop = one_component(instance, list(fed), [], fmu.model.real_outputs)
+        loop.start(system.start)
+        driven = np.ascontiguousarray(rows[:, list(fed.values())])
+        found = np.empty((len(rows), loop.width))
+        return seconds(lambda: loop.run(system.times[1:], driven[:-1], rows=found))
 
 
 def system_times(path: Path) -> tuple[float, float]:
@@ -84,9 +83,7 @@ def system_times(path: Path) -> tuple[float, float]:
         parts = 0.0
         for name in master.components:
             with system.unpacked_fmu(name) as fmu:
-                loop, steps = alone(of, master, name, fmu, rows[0])
-                parts += seconds(steps)
-                loop.components[0].instance.__exit__(None)
+                parts += seconds_alone(of, VARIANT, master, name, fmu, rows[0])
         return whole / of.steps, parts / of.steps
 
 
@@ -99,14 +96,8 @@ def python_time(folder: Path, arm: Path) -> float:
         master, of = begun(system, stack, "default"), system.system
         rows = []
         whole = seconds(lambda: rows.append(master.run(of.times)))
-        with Fmu(arm) as fmu, fmu.instance("arm") as instance:
-            begin_instance(instance, of.start, of.stop, {})
-            instance.exit_initialization()
-            loop = one_component(instance, ["tau1"], [], fmu.model.real_outputs)
-            loop.start(of.start)
-            driven = np.ascontiguousarray(rows[0][:, [master.names.index("law.tau1")]])
-            found = np.empty((len(driven), loop.width))
-            own = seconds(lambda: loop.run(of.times[1:], driven[1:], rows=found))
+        with Fmu(arm) as fmu:
+            own = seconds_alone(of, "default", master, "arm", fmu, rows[0])
     return (whole - own) / of.steps
 
 
